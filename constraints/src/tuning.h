@@ -39,8 +39,6 @@ struct RowTuning {
   /// manipulate(): directions of the matrix below this part of its largest are not in its range. [path]
   double manipulation_rank = 1e-11;
   double manipulation_tolerance = 1e-13;  ///< places are met when they change by less of the distances at hand
-  /// Tolerances of a gap by which a row that lies still may be open. [path]
-  double rests_within = 2.0;
 };
 
 /// The parts that a step is taken in.

@@ -13,7 +13,7 @@ void ConvexRounds::solve(IslandStep& step, IslandReport& report) {
   fill_units(step);
   begin_units(step);
   secants_.begin(step.size());
-  begun_ = false, loads_change_ = true;
+  begun_ = false;
   report.iterations = 1;
   iterate(step, report);
 }
@@ -32,7 +32,7 @@ void ConvexRounds::iterate(IslandStep& step, IslandReport& report) {
     const Distance left = find_starts(step, !begun_);
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
-    if (!loads_change_ && (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0))) return;
+    if (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0)) return;
     if (report.iterations > step.part.options.max_iterations) break;
     const ConvexContactOptions within{
         .tolerance = kConstraintsTuning.rounds.newton_left,
@@ -42,8 +42,6 @@ void ConvexRounds::iterate(IslandStep& step, IslandReport& report) {
     report.newton_steps += done.iterations;
     if (done.status != SolveStatus::kSolved) break;
     stiffen(step);
-    loads_change_ = press_early(step);
-    if (loads_change_) secants_.begin(step.size());
     advance_units(step);
   }
   end_at_limit(step, report);
@@ -108,7 +106,7 @@ void ConvexRounds::fill_rows(const IslandStep& step) {
 void ConvexRounds::fill_units(const IslandStep& step) {
   const IslandBodies& bodies = step.bodies;
   root_.resize(static_cast<std::size_t>(bodies.degrees_of_freedom()));
-  bodies.write_position_metric(step.length(), step.theta, root_);
+  bodies.write_position_metric(step.length(), 1.0, root_);
   for (double& weight : root_) weight = std::sqrt(weight);
   fill_rows(step);
   for (std::size_t u = 0; u < units_.size(); ++u) {
@@ -149,9 +147,7 @@ void ConvexRounds::begin_units(const IslandStep& step) {
     Unit& unit = units_[u];
     const RowParameters& law = step.law(unit.first);
     for (std::size_t r = 0; r < unit.rows; ++r) {
-      const auto axis = static_cast<int>(r);
-      unit.impulse[axis] = step.length() * step.reaction[unit.first + r];
-      unit.anchor[axis] = law.contact ? step.length() * step.law(unit.first + r).last_force : unit.impulse[axis];
+      if (law.contact) unit.anchor[static_cast<int>(r)] = step.length() * step.law(unit.first + r).last_force;
     }
     unit.anchor = contacts_.potential(u).nearest(unit.anchor);
     unit.shift = law.shift;
@@ -164,8 +160,7 @@ void ConvexRounds::take_impulses(IslandStep& step) {
   for (std::size_t u = 0; u < units_.size(); ++u) {
     const Unit& unit = units_[u];
     contacts_.impulse(u) = unit.impulse;
-    for (std::size_t r = 0; r < unit.rows; ++r)
-      step.f[unit.first + r] = unit.impulse[static_cast<int>(r)] - step.length() * step.reaction[unit.first + r];
+    for (std::size_t r = 0; r < unit.rows; ++r) step.f[unit.first + r] = unit.impulse[static_cast<int>(r)];
   }
   contacts_.set_motion();
 }
@@ -272,26 +267,6 @@ void ConvexRounds::take_whole(std::span<const double> impulses) {
   }
 }
 
-/// Where something presses, gravity and held forces come to the frame at the step's start, as contacts do: what rests
-/// has no velocity then, and the work of all is that over one displacement. Bodies in flight fall exactly.
-/// @return whether there are more of them
-bool ConvexRounds::press_early(IslandStep& step) const {
-  std::vector<char>& early = step.loads.early;
-  bool more = false;
-  for (std::size_t u = 0; step.theta == 1.0 && u < units_.size(); ++u) {
-    if (!step.law(units_[u].first).contact || contacts_.impulse(u).isZero(0.0)) continue;
-    step.for_bodies(units_[u].first, [&](const ConstraintRows::Side&, Index local, bool) {
-      more = more || early[static_cast<std::size_t>(local)] == 0;
-      early[static_cast<std::size_t>(local)] = 1;
-    });
-  }
-  if (more && !step.contacts_alone && !step.loads.all_early) {
-    step.loads.take_all_early();
-    std::ranges::fill(step.reaction, 0.0);
-  }
-  return more;
-}
-
 /// What the bodies yield beyond their modes, in a row's gap.
 double ConvexRounds::indentation_of(const IslandStep& step, std::size_t row) {
   double sum = 0.0;
@@ -315,8 +290,8 @@ void ConvexRounds::take_motion(IslandStep& step) {
     ConstraintLoad& load = step.loads.frames[static_cast<std::size_t>(local)];
     double* modal = step.loads.modal(local);
     std::size_t k = 0;
-    for (int i = 0; i < r.translations; ++i, ++k) load.impulse[i] += step.theta * y[k] / weight[k];
-    for (int i = 0; i < r.rotations; ++i, ++k) load.moment += step.theta * y[k] / weight[k] * r.axes.col(i);
+    for (int i = 0; i < r.translations; ++i, ++k) load.impulse[i] += y[k] / weight[k];
+    for (int i = 0; i < r.rotations; ++i, ++k) load.moment += y[k] / weight[k] * r.axes.col(i);
     for (int i = 0; i < r.modes; ++i, ++k)
       if (weight[k] > 0.0) modal[i] += y[k] / weight[k];
   }
@@ -324,7 +299,6 @@ void ConvexRounds::take_motion(IslandStep& step) {
 }
 
 void ConvexRounds::write_slip(const IslandStep& step, std::span<double> slip) const {
-  if (!step.takes_loads_early()) return;
   for (const Unit& unit : units_)
     if (step.law(unit.first).friction > 0.0 && unit.impulse[0] > 0.0) slip[unit.first] = unit.end.tail<2>().norm();
 }

@@ -51,7 +51,6 @@ class ConvexRounds {
   Vec3 open_gap(const IslandStep& step, const Unit& unit);
   double indentation_of(const IslandStep& step, std::size_t row);
   void stiffen(const IslandStep& step);
-  bool press_early(IslandStep& step) const;
   void advance_units(const IslandStep& step);
   void take_whole(std::span<const double> impulses);
   void end_at_limit(IslandStep& step, IslandReport& report);
@@ -65,7 +64,6 @@ class ConvexRounds {
   std::vector<double> root_;        // D^½, by degree of freedom
   std::vector<double> one_row_;
   bool begun_ = false;                      // there is a motion to go on from
-  bool loads_change_ = false;               // the last round has brought some to the step's start
   SecantIteration secants_;                 // beside joints
   std::vector<double> at_, next_, change_;  // their numbers, by row
 };

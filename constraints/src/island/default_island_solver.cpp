@@ -14,7 +14,7 @@ class DefaultIslandSolver final : public IslandParts {
   void write_slip(std::span<double> slip) const override;
 
  private:
-  bool find_middle(IslandReport& done);
+  void find_middle(IslandReport& done);
   void find_mean(IslandReport& done);
 
   ConvexRounds rounds_;
@@ -28,10 +28,8 @@ IslandReport DefaultIslandSolver::find(const StepPart& part) {
     find_mean(done);
     return done;
   }
-  reaction_.find(step_, StepTime::kStart);
   rounds_.solve(step_, done);
-  if (!done.accepted && find_middle(done)) return done;
-  act_at_end();
+  if (!done.accepted) find_middle(done);
   return done;
 }
 
@@ -39,25 +37,20 @@ void DefaultIslandSolver::write_slip(std::span<double> slip) const {
   step_.mean ? mean_.write_slip(step_, slip) : rounds_.write_slip(step_, slip);
 }
 
-/// Joints beside contacts that rounds have not found: by rows of the middle of the step and true derivatives. @return
-/// whether that is found; else what the rounds came to stays
-bool DefaultIslandSolver::find_middle(IslandReport& done) {
-  if (!step_.touches || step_.contacts_alone) return false;
-  if (step_.size() > kConstraintsTuning.parts.most_rows_in_the_middle) return false;
-  const bool all_early = step_.loads.all_early;
+/// Joints beside contacts that rounds have not found: by rows of the middle of the step and true derivatives. Where
+/// that is not found either, what the rounds came to stays.
+void DefaultIslandSolver::find_middle(IslandReport& done) {
+  if (step_.contacts_alone || step_.size() > kConstraintsTuning.parts.most_rows_in_the_middle) return;
   IslandReport middle;
   step_.take_middle(true);
   middle.accepted = mean_.solve(step_, middle, true) == SolveStatus::kSolved;
   middle.attempts[StepAttempt::kInTheMiddle] = 1;
   if (middle.accepted) {
     done = middle;
-    return true;
+    return;
   }
   step_.take_middle(false);
-  if (all_early) step_.loads.take_all_early();
-  reaction_.find(step_, StepTime::kStart);
   rounds_.take_again(step_);
-  return false;
 }
 
 /// Of bodies on joints and the like. As the last resort bodies do not bend, which is always found but for the

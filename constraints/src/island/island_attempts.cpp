@@ -22,13 +22,6 @@ void IslandParts::begin(const StepPart& part, bool contacts_react) {
   energy_.begin(step_);
 }
 
-void IslandParts::act_at_end() {
-  if (step_.takes_loads_early()) return;
-  step_.linearise_end();
-  reaction_.find(step_, StepTime::kEnd);
-  step_.load_end();
-}
-
 /// And the energy with it: where it would rise by more than what drives the island, relative motion is taken at the
 /// start, if all rows came together, or impulses are refused.
 IslandReport IslandParts::find_guarded(const StepPart& part) {

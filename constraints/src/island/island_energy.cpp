@@ -75,7 +75,9 @@ void IslandEnergy::begin(const IslandStep& step) {
 
 double IslandEnergy::close(const IslandStep& step, IslandReport& report) {
   const double slowed = step.part.slowed;
-  const bool give_back = step.part.options.undisturbed && report.accepted && slowed == 0.0 && is_workless(step);
+  // Loads at the start take ½ m g² Δt² of all that falls: no row's work, and nothing to make relative motion of.
+  const bool give_back =
+      step.part.options.undisturbed && report.accepted && slowed == 0.0 && !step.loads_at_start && is_workless(step);
   const Change done = guard(step, give_back);
   report.energy_removed = done.removed + (slowed > 0.0 ? start_energy_ * slowed * (2.0 - slowed) : 0.0);
   report.energy_surplus = done.surplus;

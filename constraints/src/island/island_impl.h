@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "../tuning.h"
-#include "held_reaction.h"
 #include "island_energy.h"
 #include "island_step.h"
 
@@ -35,7 +34,7 @@ class IslandParts : public IslandSolver {
                     std::span<Constraint* const> constraints, const IslandOptions& options) override;
 
  protected:
-  /// What becomes of the members by the end of a part, all but the energy; from begin() to act_at_end().
+  /// What becomes of the members by the end of a part, all but the energy; begins with begin().
   virtual IslandReport find(const StepPart& part) = 0;
   /// What find() found last happens.
   virtual void taken() {}
@@ -48,11 +47,8 @@ class IslandParts : public IslandSolver {
 
   /// Makes step_ the part at hand. @param contacts_react as IslandStep::begin()
   void begin(const StepPart& part, bool contacts_react);
-  /// The frames' second half of what holds them, and of what strikes them.
-  void act_at_end();
 
   IslandStep step_;  // the part at hand
-  HeldReaction reaction_;
 
  private:
   // The step in parts.

@@ -54,7 +54,6 @@ void IslandStep::begin(const StepPart& of, bool contacts_react) {
     impulses->assign(m, 0.0);
   end_work = end_modal_gain = 0.0;
   find_kind(contacts_react);
-  begin_early();
   measure(StepTime::kStart, start_gap);
   gap = start_gap;
   set_modal_steps();
@@ -63,11 +62,7 @@ void IslandStep::begin(const StepPart& of, bool contacts_react) {
   bodies.write_position_metric(length(), theta, metric_);
 }
 
-void IslandStep::take_middle(bool middle) {
-  mean = middle, convex = !middle;
-  std::ranges::fill(reaction, 0.0);
-  begin_early();
-}
+void IslandStep::take_middle(bool middle) { mean = middle, convex = !middle; }
 
 bool IslandStep::any_law(bool (*holds)(const RowParameters&)) const {
   for (Index i = 0; i < rows.size(); ++i)
@@ -79,24 +74,11 @@ void IslandStep::find_kind(bool contacts_react) {
   contacts_alone = !any_law([](const RowParameters& law) { return !law.contact; });
   touches = any_law([](const RowParameters& law) { return law.contact; });
   mean = !contacts_react && !touches;
-  convex = !contacts_react && !mean;
+  convex = loads_at_start = !contacts_react && !mean;
   skinned = false;
   for (Index local = 0; local < bodies.count(); ++local)
     skinned = skinned || bodies.body(local).group->skinned(bodies.body(local).slot);
   theta = 1.0;
-}
-
-/// Bodies that something pressed on in the last step.
-void IslandStep::begin_early() {
-  std::vector<char>& early = loads.early;
-  early.assign(static_cast<std::size_t>(bodies.count()), 0);
-  loads.all_early = false;
-  if (!(convex || mean) || theta < 1.0) return;
-  for (std::size_t row = 0; row < size(); ++row)
-    if (law(row).contact && law(row).last_force != 0.0)
-      for_bodies(row,
-                 [&](const ConstraintRows::Side&, Index local, bool) { early[static_cast<std::size_t>(local)] = 1; });
-  if (!contacts_alone && std::ranges::any_of(early, [](char c) { return c != 0; })) loads.take_all_early();
 }
 
 /// Makes the modes go through a part of a step.
@@ -145,7 +127,7 @@ void IslandStep::move_under_loads() {
   for (Index local = 0; local < bodies.count(); ++local) {
     const ConstrainedBody& body = bodies.body(local);
     ConstraintLoad& load = loads.frames[static_cast<std::size_t>(local)];
-    if (loads.early[static_cast<std::size_t>(local)] != 0) load_early(local, load);
+    if (loads_at_start) load_start(local, load);
     body.group->predict(body.slot, held_gravity(local), load, bodies.modal_step(local));
   }
 }
@@ -189,7 +171,7 @@ void IslandStep::bend_rows() {
 
 /// The frame's part. Modes of a free body do not feel gravity; those of one that is held somewhere have it over the
 /// whole part, as they have contact forces.
-void IslandStep::load_early(Index local, ConstraintLoad& load) const {
+void IslandStep::load_start(Index local, ConstraintLoad& load) const {
   const ConstrainedBody& body = bodies.body(local);
   const FrameConstants& c = body.group->frame_constants();
   const Vec3 weight = c.mass * gravity_of(local), arm = body.group->frame(body.slot).pose().q * c.center_of_mass;
@@ -203,8 +185,7 @@ void IslandStep::load_early(Index local, ConstraintLoad& load) const {
 /// What is left of gravity and held forces for the whole part, where those come at its start.
 Vec3 IslandStep::held_gravity(Index local) const {
   const ConstrainedBody& body = bodies.body(local);
-  if (loads.early[static_cast<std::size_t>(local)] == 0 || body.group->frame_constants().motion != FrameMotion::kFree)
-    return gravity_of(local);
+  if (!loads_at_start || body.group->frame_constants().motion != FrameMotion::kFree) return gravity_of(local);
   return -body.group->held_force(body.slot) / body.group->frame_constants().mass;
 }
 
@@ -217,17 +198,6 @@ void IslandStep::linearise(StepTime when, ConstraintRows& to) const {
 void IslandStep::linearise_end() {
   bodies.place(StepTime::kEnd);
   linearise(StepTime::kEnd, end_rows);
-}
-
-void IslandStep::load_end() {
-  loads.clear(bodies);
-  loads.add(bodies, end_rows, end_reaction, 0.5 * length(), 0.0);
-  if (theta < 1.0) loads.add(bodies, end_rows, f, 1.0 - theta, 0.0);
-  for (Index local = 0; local < bodies.count(); ++local) {
-    const ConstrainedBody& body = bodies.body(local);
-    const ConstraintLoad& load = loads.frames[static_cast<std::size_t>(local)];
-    body.group->adjust_prediction(body.slot, load.impulse, load.moment, {});
-  }
 }
 
 }  // namespace limber::internal

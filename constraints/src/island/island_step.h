@@ -50,13 +50,7 @@ struct IslandLoads {
   std::vector<ConstraintLoad> frames;  // by body; their modal parts are parts of:
   std::vector<double> modes;           // by degree of freedom
   std::vector<ModalStep> steps;        // how the modes go through the part, where not as their groups go through a step
-  std::vector<char> early;             // by body: whether it gets gravity and held forces at the part's start
-  bool all_early = false;
 
-  void take_all_early() {
-    all_early = true;
-    std::ranges::fill(early, 1);
-  }
   void clear(const IslandBodies& bodies);
   /// @param values by row. @param frame_scale, modal_scale of them, what frames and modes get
   void add(const IslandBodies& bodies, const ConstraintRows& rows, std::span<const double> values, double frame_scale,
@@ -76,9 +70,10 @@ struct IslandStep {
   bool convex = false;                           // in rounds: with contacts
   bool contacts_alone = false;                   // among the rows
   bool skinned = false;                          // some bodies bend by their modal skins
-  bool mean = false;     // joints and the like: impulses act by the rows of the middle of the step
-  bool touches = false;  // some rows are contacts
-  double theta = 1.0;    // the part of f that frames get at the start; the rest at the end
+  bool mean = false;            // joints and the like: impulses act by the rows of the middle of the step
+  bool touches = false;         // some rows are contacts
+  bool loads_at_start = false;  // gravity and held forces come to the frames there, as impulses do
+  double theta = 1.0;           // the part of f that frames get at the start; the rest at the end
   std::vector<double> start_gap, gap;
   std::vector<double> f;                       // N·s, beside the reactions
   std::vector<double> reaction, end_reaction;  // N, to held forces, at the start and at the end
@@ -89,7 +84,7 @@ struct IslandStep {
   IslandLoads loads;
 
   /// Linearises the rows. All impulses are zero. @param contacts_react contacts answer to held forces as other rows
-  /// that hold do (held_reaction.h), and no row comes in rounds or in the middle of the step
+  /// that hold do, which are half at the start: no row comes in rounds or in the middle of the step
   void begin(const StepPart& of, bool contacts_react);
   /// Joints beside contacts: to be solved by the rows of the middle of the step, or in rounds.
   void take_middle(bool middle);
@@ -118,13 +113,7 @@ struct IslandStep {
   void linearise(StepTime when, ConstraintRows& to) const;
   void linearise_end();
   void measure(StepTime when, std::vector<double>& into) const;
-  /// The frames' second half of what holds them, and of what strikes them, by the rows at the end.
-  void load_end();
 
-  /// Of joints, and of contacts that react: what rows answer to held forces by themselves.
-  bool answers_to_loads() const { return !(convex && (contacts_alone || loads.all_early)); }
-  /// All loads and impulses come at the start; nothing is left for the end.
-  bool takes_loads_early() const { return !answers_to_loads() && theta == 1.0; }
   /// act(side, local, again) for the bodies of a row; again: the one before was the same body.
   template <class Action>
   void for_bodies(std::size_t row, Action&& act) const;
@@ -138,14 +127,13 @@ struct IslandStep {
   }
 
  private:
-  void load_early(Index local, ConstraintLoad& load) const;
+  void load_start(Index local, ConstraintLoad& load) const;
   Vec3 held_gravity(Index local) const;
   void set_loads();
   void move_under_loads();
   void follow_bending();
   void bend_rows();
   void find_kind(bool contacts_react);
-  void begin_early();
   void set_modal_steps();
 
   SecantIteration bending_;                            // of modal loads

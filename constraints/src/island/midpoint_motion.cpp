@@ -57,7 +57,7 @@ void MidpointMotion::begin(IslandStep& step, bool bends) {
   const double h = step.length();
   bodies_.clear(), carried_.clear();
   length_ = h, bends_ = bends;
-  share_ = step.loads.all_early ? 1.0 : 0.5;
+  share_ = step.loads_at_start ? 1.0 : 0.5;
   Index modes = 0;
   for (Index local = 0; local < step.bodies.count(); ++local) {
     const ConstrainedBody& at = step.bodies.body(local);

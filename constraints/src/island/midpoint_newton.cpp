@@ -23,7 +23,6 @@ SolveStatus MidpointNewton::iterate(IslandStep& step, IslandReport& report) {
     if (problem_.measure(step, motion_, impulses_)) return SolveStatus::kSolved;
     ++i, ++report.iterations;
     if (!improve(step)) break;
-    if (presses_early(step)) continue;
     if (std::exchange(first, false) && free_is_nearer()) {
       forget_forces(step);
       continue;
@@ -37,23 +36,6 @@ SolveStatus MidpointNewton::iterate(IslandStep& step, IslandReport& report) {
     if (problem_.touches_law()) return SolveStatus::kSolved;
   }
   return SolveStatus::kIterationLimit;
-}
-
-/// Where something presses all impulses and what is held come at the step's start: anew from the impulses at hand.
-/// Contacts that let go again in this are too few to matter. @return whether they did not yet
-bool MidpointNewton::presses_early(IslandStep& step) {
-  if (step.loads.all_early) return false;
-  for (std::size_t i = 0; i < impulses_.size(); ++i)
-    if (step.law(i).contact && impulses_[i] + change_.impulses[static_cast<Eigen::Index>(i)] != 0.0) {
-      step.loads.take_all_early();
-      motion_.begin(step, bends_);
-      motion_.write_place(free_);
-      motion_.guess(step, impulses_);
-      motion_.write_place(guess_);
-      forget_matrix();
-      return true;
-    }
-  return false;
 }
 
 void MidpointNewton::move(const IslandStep& step) {
@@ -116,7 +98,7 @@ void MidpointNewton::finish(IslandStep& step) {
 }
 
 void MidpointNewton::write_slip(const IslandStep& step, std::span<double> slip) const {
-  if (!step.loads.all_early) return;
+  if (!step.loads_at_start) return;
   for (std::size_t i = 0; i < impulses_.size(); ++i)
     if (step.law(i).friction > 0.0 && impulses_[i] > 0.0)
       slip[i] = problem_.off().segment<2>(static_cast<Eigen::Index>(i) + 1).norm();

@@ -26,7 +26,6 @@ class MidpointNewton {
  private:
   SolveStatus iterate(IslandStep& step, IslandReport& report);
   void begin(IslandStep& step);
-  bool presses_early(IslandStep& step);
   void forget_matrix();
   void forget_forces(const IslandStep& step);
   bool free_is_nearer() const;

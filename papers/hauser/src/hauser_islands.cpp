@@ -19,6 +19,18 @@ bool allows_cuts(const StepPart& part) {
          has_no_dates(part);
 }
 
+/// The frames' second half of what holds them, and of what strikes them, by the rows at the end.
+void load_end(IslandStep& step) {
+  step.loads.clear(step.bodies);
+  step.loads.add(step.bodies, step.end_rows, step.end_reaction, 0.5 * step.length(), 0.0);
+  if (step.theta < 1.0) step.loads.add(step.bodies, step.end_rows, step.f, 1.0 - step.theta, 0.0);
+  for (Index local = 0; local < step.bodies.count(); ++local) {
+    const ConstrainedBody& body = step.bodies.body(local);
+    const ConstraintLoad& load = step.loads.frames[static_cast<std::size_t>(local)];
+    body.group->adjust_prediction(body.slot, load.impulse, load.moment, {});
+  }
+}
+
 }  // namespace
 
 IslandReport ProgramIslands::find(const StepPart& part) {
@@ -32,7 +44,7 @@ IslandReport ProgramIslands::find(const StepPart& part) {
   step_.linearise_end();
   if (by_velocities) touch_.hold_forces(step_.end_rows, step_.length());
   reaction_.find(step_, StepTime::kEnd);
-  step_.load_end();
+  load_end(step_);
   return done;
 }
 

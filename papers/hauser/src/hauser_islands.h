@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "held_reaction.h"
 #include "island/island_impl.h"
 #include "limber/hauser/contact_rule.h"
 #include "penalty_contact.h"
@@ -29,6 +30,7 @@ class ProgramIslands final : public IslandParts {
   ContactRule rule_;
   std::shared_ptr<ProgramReport> programs_;  // of all steps taken
   ProgramReport found_;                      // of the part at hand
+  HeldReaction reaction_;
   TouchProgram touch_;
   TouchTimes times_;
   std::vector<ExactMotion> motions_;  // of the members, where a step may be cut

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "island/held_reaction.h"
+#include "held_reaction.h"
 #include "island/island_step.h"
 #include "limber/hauser/contact_rule.h"
 

@@ -10,18 +10,17 @@
 /// brought in line with the rows at the end, which takes a little energy; where joints alone act it is given back. The
 /// rotation of such a body is of second order in the step; bodies without constraints rotate exactly.
 ///
-/// Islands with contacts and bodies that are fixed at a point or line or carried
+/// Islands with contacts
 ///   1. linearise the rows at the step's start (Constraint::add_rows),
-///   2. find the constraint forces under gravity and held forces; they act on the frames half at the step's start and
-///      half at its end, so that what rests has no velocity,
+///   2. give gravity and held forces to the frames at the step's start, where impulses act, so that what rests has no
+///      velocity. Islands without contacts fall exactly,
 ///   3. predict bodies exactly under f, measure gaps and solve for Δf until gaps change by less than their tolerance,
 ///   4. guard the energy: where it would rise by more than the work of what drives the island, relative motion is
 ///      slowed, or impulses are reduced.
 /// Then the prediction is committed and the constraints are told their impulses (Constraint::accept).
 ///
-/// Islands with contacts solve 3 in rounds of a convex problem, in which every row yields a little less in each: the
-/// answer is (1) with Coulomb's cone. There loads come to the frames of what is pressed on at the step's start, in
-/// place of 2.
+/// They solve 3 in rounds of a convex problem about the motion under the impulses at hand (the method of multipliers),
+/// in which every row yields a little less in each round. The answer is (1) with Coulomb's cone.
 ///
 /// Tolerances are the rows' own. Iterations are bounded (IslandOptions::max_iterations; 500 Newton steps for contacts).
 /// A step that ends by one of these limits keeps the best impulses found, or the motion found where there are none:

@@ -1,11 +1,12 @@
 #include "held_reaction.h"
-#include "../tuning.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace limber::internal {
 namespace {
+
+constexpr double kRestsWithin = 2.0;  // tolerances of a gap, by which a row that lies still may be open
 
 FrameAcceleration held_acceleration(const BodyGroup& group, Index slot, StepTime when, const BodyResponse& r,
                                     const Vec3& gravity) {
@@ -22,7 +23,7 @@ FrameAcceleration held_acceleration(const BodyGroup& group, Index slot, StepTime
 
 /// Whether bodies lie still on a row of one sign: closed, and slower than what held forces make of rest in a step.
 bool rests(const RowParameters& law, double gap, const HeldReaction::Motion& held) {
-  const double open = gap - law.offset, within = kConstraintsTuning.rows.rests_within * law.tolerance;
+  const double open = gap - law.offset, within = kRestsWithin * law.tolerance;
   const bool closed = (law.lower < 0.0 || open <= within) && (law.upper > 0.0 || open >= -within);
   return closed && std::abs(held.speed) <= held.speed_of_a_step;
 }
@@ -36,7 +37,6 @@ const ConstraintRows& rows_at(const IslandStep& step, StepTime when) {
 void HeldReaction::find(IslandStep& step, StepTime when) {
   std::vector<double>& forces = when == StepTime::kStart ? step.reaction : step.end_reaction;
   std::ranges::fill(forces, 0.0);
-  if (!step.answers_to_loads()) return;
   find_accelerations(step, when);
   if (!bound_rows(step, when)) return;
   weigh_frames(step, rows_at(step, when));
@@ -88,7 +88,6 @@ bool HeldReaction::bound_rows(const IslandStep& step, StepTime when) {
   for (Index i = 0; i < rows.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const RowParameters& law = rows.row(i).law;
-    if (step.convex && law.contact) continue;
     const Motion held = motion_of(step, when, i);
     const bool lies = rests(law, step.gap[at], held);
     if (law.friction > 0.0) rested = lies;

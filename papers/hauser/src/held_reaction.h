@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "island_step.h"
+#include "island/island_step.h"
 #include "limber/solvers/least_squares.h"
 #include "limber/solvers/row_equilibrium.h"
 
@@ -18,8 +18,7 @@ struct FrameAcceleration {
 
 class HeldReaction {
  public:
-  /// To step.reaction by the rows at the start, to step.end_reaction by those at the end, N. Zero where loads come with
-  /// the impulses.
+  /// To step.reaction by the rows at the start, to step.end_reaction by those at the end, N.
   void find(IslandStep& step, StepTime when);
 
   /// Of all bodies, for motion_of().
