@@ -139,10 +139,9 @@ void run(const std::string& name, const std::function<void(Scene&, int)>& build)
       }
       const Seen seen = watch(s, scale);
       const auto n = [&](StepAttempt a) { return seen.attempts[a]; };
-      std::printf("| %s | %d | %g | %d | %.0e | %d, %d | %d, %d, %d | %.1e | %.1e | %.1e | %.1e |\n", name.c_str(),
-                  modes, recovery, seen.unsettled, seen.residual, seen.iterations, seen.newton_steps,
-                  n(StepAttempt::kDivided), n(StepAttempt::kSlowed), n(StepAttempt::kRefused), seen.apart,
-                  seen.deepest / kSampleSize, seen.rise, seen.removed);
+      std::printf("| %s | %d | %g | %d | %.0e | %d, %d | %d, %d | %.1e | %.1e | %.1e | %.1e |\n", name.c_str(), modes,
+                  recovery, seen.unsettled, seen.residual, seen.iterations, seen.newton_steps, n(StepAttempt::kDivided),
+                  n(StepAttempt::kRefused), seen.apart, seen.deepest / kSampleSize, seen.rise, seen.removed);
       std::fflush(stdout);
     }
 }
@@ -193,7 +192,7 @@ void run_all() {
   std::printf(
       "| scene | modes | recovery, m/s | unsettled | off the law (residual × 1e-9) | most rounds, Newton steps | "
       "divided, "
-      "slowed, refused | joints "
+      "refused | joints "
       "apart, m | deepest / size | "
       "largest rise | taken by the guard |\n|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const double times : {1.0, 10.0, 100.0, 1e3, 1e4}) {

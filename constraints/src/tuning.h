@@ -92,9 +92,6 @@ struct EnergyTuning {
   /// Gains above so many energies at hand are nonsense, not motion to be slowed: no digits would be left. [path]
   double nonsense = 10.0;
   double recovery_speed = 1.0;  ///< m/s: what is out of place brings even bodies at rest together about this fast
-  int most_slowings = 3;        ///< slower starts of a step. [path] Bounds the work
-  double slowed_by = 1.5;       ///< of what is left is taken, as not all motion taken would have gone into height
-  double slowest = 0.01;        ///< of the energy: what would be slower rests. [path]
   /// Part of the impulses that is refused at first: of contacts alone, as half of what holds a pile would be half a
   /// fall; of others. Each refusal is twice the one before, up to the most.
   double refused_of_contacts = 0.01, refused_of_joints = 0.5, refused_at_most = 0.5;

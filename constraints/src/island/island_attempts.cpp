@@ -22,27 +22,16 @@ void IslandParts::begin(const StepPart& part, bool contacts_react) {
   energy_.begin(step_);
 }
 
-/// And the energy with it: where it would rise by more than what drives the island, relative motion is taken at the
-/// start, if all rows came together, or impulses are refused.
+/// And the energy with it: where it would rise by more than what drives the island, impulses are refused.
 IslandReport IslandParts::find_guarded(const StepPart& part) {
   IslandReport done = guard(part, find(part));
   done.status = status_of(done);
   return done;
 }
 
-IslandReport IslandParts::guard(StepPart part, IslandReport done) {
+IslandReport IslandParts::guard(const StepPart& part, IslandReport done) {
   if (step_.mean && !done.accepted && !part.last_resort) return done;
-  if (!part.options.guard_energy) return done;
-  for (int slowing = 0;; ++slowing) {
-    const double left = energy_.close(step_, done);
-    if (!(left > 0.0)) return done;
-    const bool may_slow = done.accepted && may_repeat() && std::isfinite(left);
-    if (!may_slow || slowing == kConstraintsTuning.energy.most_slowings || !energy_.slow_start(step_, left, part))
-      break;
-    done = find(part);
-    done.attempts[StepAttempt::kSlowed] = 1;
-  }
-  refuse_impulses(done);
+  if (part.options.guard_energy && energy_.close(step_, done) > 0.0) refuse_impulses(done);
   return done;
 }
 

@@ -74,12 +74,10 @@ void IslandEnergy::begin(const IslandStep& step) {
 }
 
 double IslandEnergy::close(const IslandStep& step, IslandReport& report) {
-  const double slowed = step.part.slowed;
   // Loads at the start take ½ m g² Δt² of all that falls: no row's work, and nothing to make relative motion of.
-  const bool give_back =
-      step.part.options.undisturbed && report.accepted && slowed == 0.0 && !step.loads_at_start && is_workless(step);
+  const bool give_back = step.part.options.undisturbed && report.accepted && !step.loads_at_start && is_workless(step);
   const Change done = guard(step, give_back);
-  report.energy_removed = done.removed + (slowed > 0.0 ? start_energy_ * slowed * (2.0 - slowed) : 0.0);
+  report.energy_removed = done.removed;
   report.energy_surplus = done.surplus;
   return done.left;
 }
@@ -136,30 +134,6 @@ CommonMotion IslandEnergy::common_motion(const IslandStep& step, StepTime when) 
   }
   common.angular_velocity = inertia.llt().solve(angular_momentum);
   return common;
-}
-
-bool IslandEnergy::slow_start(const IslandStep& step, double left, StepPart& next) {
-  constexpr const EnergyTuning& tuning = kConstraintsTuning.energy;
-  if (next.slowed == 0.0) start_energy_ = start_motion(step);
-  if (next.slowed == 1.0 || !(start_energy_ > 0.0)) return false;
-  const double moving = (1.0 - next.slowed) * (1.0 - next.slowed) - tuning.slowed_by * left / start_energy_;
-  next.slowed = moving > tuning.slowest ? 1.0 - std::sqrt(moving) : 1.0;
-  next.relative = momenta_;
-  return true;
-}
-
-/// What the frames have beside the common motion at the step's start, to momenta_. @return its energy, J
-double IslandEnergy::start_motion(const IslandStep& step) {
-  const CommonMotion common = common_motion(step, StepTime::kStart);
-  double energy = 0.0;
-  momenta_.clear();
-  for (Index local = 0; local < step.bodies.count(); ++local) {
-    const auto& [group, slot, pose] = step.bodies.body(local);
-    const RelativeMotion r = relative_motion(*group, slot, StepTime::kStart, common);
-    momenta_.push_back({r.momentum, r.angular_momentum});
-    energy += r.energy;
-  }
-  return energy;
 }
 
 /// Scales all velocities relative to the common motion so that their energy, which the split leaves free of mixed

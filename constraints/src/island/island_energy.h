@@ -22,9 +22,6 @@ class IslandEnergy {
   /// where rows that can neither give nor take energy have lost some to the method, that is given back.
   /// @return J, that standing still could not take out
   double close(const IslandStep& step, IslandReport& report);
-  /// A swing that turns round within the step ends higher than it may, though its rows came together: it is to begin
-  /// more slowly, at rest in the end. @param left J, to be lost. @return whether there is motion to take
-  bool slow_start(const IslandStep& step, double left, StepPart& next);
 
  private:
   struct Change {
@@ -34,14 +31,11 @@ class IslandEnergy {
   };
   Change guard(const IslandStep& step, bool give_back);
   CommonMotion common_motion(const IslandStep& step, StepTime when) const;
-  double start_motion(const IslandStep& step);
   double remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess,
                                 double largest_part);
 
   double before_ = 0.0, scale_ = 0.0, recovery_ = 0.0;
   bool driven_ = false;
-  double start_energy_ = 0.0;           // of the frames' relative motion at the start, J
-  std::vector<FrameMomentum> momenta_;  // of that
   std::vector<double> modal_;
 };
 

@@ -40,8 +40,6 @@ class IslandParts : public IslandSolver {
   virtual void taken() {}
   /// @param slip by row, zero
   virtual void write_slip(std::span<double>) const {}
-  /// Whether find() may be asked for the same part begun more slowly.
-  virtual bool may_repeat() const { return true; }
   /// How much of what is left of a step the next part is to take, s. @param cuts of the step so far
   virtual double next_cut(const StepPart& part, int /*cuts*/) { return part.left; }
 
@@ -60,7 +58,7 @@ class IslandParts : public IslandSolver {
 
   // A part.
   IslandReport find_guarded(const StepPart& part);
-  IslandReport guard(StepPart part, IslandReport done);
+  IslandReport guard(const StepPart& part, IslandReport done);
   void refuse_impulses(IslandReport& report);
 
   IslandEnergy energy_;

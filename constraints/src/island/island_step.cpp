@@ -112,10 +112,6 @@ void IslandStep::set_loads() {
   loads.clear(bodies);
   loads.add(bodies, rows, f, theta, 1.0);
   loads.add(bodies, rows, reaction, 0.5 * length(), length());
-  for (std::size_t i = 0; part.slowed > 0.0 && i < loads.frames.size(); ++i) {
-    loads.frames[i].impulse -= part.slowed * part.relative[i].linear;
-    loads.frames[i].moment -= part.slowed * part.relative[i].angular;
-  }
 }
 
 void IslandStep::predict_under_loads() {

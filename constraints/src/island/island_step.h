@@ -26,11 +26,6 @@ inline ContactPotential set_of(const RowParameters& first) {
   return {.set = Set::kInterval, .lower = first.lower, .upper = first.upper};
 }
 
-/// Of a body's frame, as its impulses are.
-struct FrameMomentum {
-  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
-};
-
 /// A step, or a part of one where it is cut.
 struct StepPart {
   std::span<const ConstrainedBody> table;
@@ -40,9 +35,7 @@ struct StepPart {
   double whole_step = 0.0;  ///< s
   double left = 0.0;        ///< s, of the step, from where the part begins
   bool begins = true, ends = true;
-  bool last_resort = false;                      ///< shorter parts were not found either
-  double slowed = 0.0;                           ///< the part of `relative` that is taken from the frames at the start
-  std::span<const FrameMomentum> relative = {};  ///< by member
+  bool last_resort = false;  ///< shorter parts were not found either
 };
 
 /// What acts on the bodies of an island, in the form in which they are predicted.

@@ -23,7 +23,6 @@ class ProgramIslands final : public IslandParts {
  protected:
   IslandReport find(const StepPart& part) override;
   void taken() override { programs_->add(found_); }
-  bool may_repeat() const override { return rule_.method != ContactMethod::kVelocityProgram; }
   double next_cut(const StepPart& part, int cuts) override;
 
  private:

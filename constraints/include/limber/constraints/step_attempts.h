@@ -11,7 +11,6 @@ namespace limber {
 enum class StepAttempt {
   kCutAtTouch,   ///< where bodies touch: by [H03]'s velocity program alone
   kDivided,      ///< into halves, down to 64ths: joints did not come together
-  kSlowed,       ///< relative motion was taken at its start: a swing would have ended too high
   kRefused,      ///< impulses or bending were given up: the step has failed (IslandStatus::kFailed)
   kInTheMiddle,  ///< joints beside contacts by rows of the middle of the step, after rounds did not settle
 };
@@ -27,7 +26,7 @@ class StepAttempts {
   }
 
  private:
-  std::array<int, 5> counts_{};
+  std::array<int, 4> counts_{};
 };
 
 }  // namespace limber
