@@ -52,6 +52,9 @@ void FreeMotionOptions::validate() const {
                           std::to_string(largest_overlap) + ", expected numbers >= 0");
   if (!(crease_angle >= 0.0 && crease_angle <= kPi))
     throw InvalidArgument("FreeMotionOptions: crease_angle is " + std::to_string(crease_angle) + ", expected 0 to pi");
+  if (!(within.low <= 0.0 && within.high >= 0.0))
+    throw InvalidArgument("FreeMotionOptions: within is " + std::to_string(within.low) + " to " +
+                          std::to_string(within.high) + ", expected an interval that 0 belongs to");
 }
 
 namespace {
@@ -73,7 +76,9 @@ FreeMotion motion_among_nearest(const PathFrame& frame, std::span<const OrbitBod
     const auto near = encounters.nearest(pairs);
     FreeMotion m = internal::search_motion(frame, internal::some_of(moving, near.moving),
                                            internal::some_of(fixed, near.fixed), t, options);
-    if (m.reachable.low < near.low || m.reachable.high > near.high) continue;
+    if (std::max(m.reachable.low, options.within.low) < near.low ||
+        std::min(m.reachable.high, options.within.high) > near.high)
+      continue;
     for (MotionStop* stop : {&m.low, &m.high})
       if (stop->body >= 0) stop->body = near.fixed[static_cast<std::size_t>(stop->body)];
     const double period = frame.kind() == MotionPath::Kind::kRotation ? 2.0 * kPi : 0.0;

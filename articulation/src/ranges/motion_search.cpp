@@ -30,6 +30,8 @@ struct Side {
       if (all[f].cap || all[f].normal.isZero() || places.holds(all[f])) continue;
       faces.push_back(all[f]);
       meeting.emplace_back(all[f]);
+      around.emplace_back();
+      for (const Vec3& p : all[f].corners) around.back().extend(p);
       runs_along.push_back(along[f]);
       boxes.push_back(all[f].box);
     }
@@ -37,6 +39,7 @@ struct Side {
   }
   std::vector<OrbitFace> faces;
   std::vector<MeetingFace> meeting;
+  std::vector<Eigen::AlignedBox3d> around;  ///< as drawn, path coordinates
   std::vector<char> runs_along;
   std::optional<OrbitBoxTree> tree;
 };
@@ -141,22 +144,33 @@ class Search {
     const auto places_within = [&](double across) {
       return SlidingPlaces(frame_, moving_faces, fixed_faces, across, tolerances_.nudge, options_.crease_angle);
     };
-    // Overlap as drawn is a matter of drawing, not of motion: δ grows until it slides, as far as δ may.
+    // Overlap as drawn is a matter of drawing, not of motion: δ grows until it slides, as far as δ may. What slides
+    // within δ slides within all that are larger, so that the number of steps is found by halving.
     double overlap = tolerances_.across;
     const auto grow_until_slide = [&](const std::vector<Vec3>& points) {
       if (points.empty()) return;
-      const auto slide = [&](const SlidingPlaces& places) {
+      const auto slide = [&](double across) {
+        const SlidingPlaces places = places_within(across);
         return std::all_of(points.begin(), points.end(), [&](const Vec3& p) { return places.holds(p); });
       };
-      while (overlap < tolerances_.largest_overlap && !slide(places_within(overlap)))
-        overlap = std::min(tuning().ranges.against.overlap_growth * overlap, tolerances_.largest_overlap);
+      const auto grown = [&, from = overlap](int steps) {
+        return std::min(from * std::pow(tuning().ranges.against.overlap_growth, steps), tolerances_.largest_overlap);
+      };
+      int most = 0;
+      while (grown(most) < tolerances_.largest_overlap) ++most;
+      for (int least = 0; least < most;)
+        if (const int middle = (least + most) / 2; slide(grown(middle)))
+          most = middle;
+        else
+          least = middle + 1;
+      overlap = grown(most);
     };
     if (const FacePairs crossing = crossing_as_drawn(moving_faces, fixed_faces); !crossing.empty())
       grow_until_slide(overlaps_as_drawn(places_within(overlap), moving_faces, fixed_faces, crossing));
     for (;;) {
       tolerances_.across = std::min(overlap + tolerances_.facets, tolerances_.largest_overlap);
       const SlidingPlaces places = places_within(tolerances_.across);
-      blocks_.clear(), overlapping_ = false, between_stops_ = {};
+      blocks_.clear(), overlapping_ = false, between_stops_ = options_.within;
       find_blocks(places, Side(places, places.moving_along(), moving_faces),
                   Side(places, places.fixed_along(), fixed_faces));
       for (;;) {
@@ -191,7 +205,7 @@ class Search {
   std::vector<Vec3> buried_points(const SlidingPlaces& places, const TriangleCrossing& crossing) const;
   bool deep(const Block& b) const;
   void join(Index body, bool sheet);
-  bool beyond_stops(const OrbitFace& moving, const OrbitFace& fixed) const;
+  bool meet_beyond(const Interval& stops, const Side& moving, std::size_t m, const Side& fixed, std::size_t f) const;
   std::pair<Spans, Spans> blocked() const;
   void hide_behind_sheets(Spans& below, Spans& above) const;
   void add_split(double low, double high, Spans& below, Spans& above) const;
@@ -266,7 +280,7 @@ std::vector<Vec3> Search::overlaps_as_drawn(const SlidingPlaces& places, const s
 
 void Search::find_blocks(const SlidingPlaces& places, const Side& moving, const Side& fixed) {
   pairs(moving, fixed, [&](std::size_t m, std::size_t f) {
-    if (!all_pairs_ && beyond_stops(moving.faces[m], fixed.faces[f])) return;
+    if (meet_beyond(all_pairs_ ? options_.within : between_stops_, moving, m, fixed, f)) return;
     for (const Block& b : blocks_of(places, {moving.faces[m], moving.meeting[m]}, {fixed.faces[f], fixed.meeting[f]})) {
       if (deep(b)) {
         overlapping_ = true;
@@ -282,13 +296,20 @@ void Search::find_blocks(const SlidingPlaces& places, const Side& moving, const 
   });
 }
 
-// True if two faces come together only where a stop was found before.
-bool Search::beyond_stops(const OrbitFace& moving, const OrbitFace& fixed) const {
-  const double half = moving.sector.half + fixed.sector.half;
-  if (!circle() || half >= kPi) return false;
-  const double middle = wrapped(fixed.sector.bearing - moving.sector.bearing);
+// True if two faces come together only where a stop is known, or nobody asks.
+bool Search::meet_beyond(const Interval& stops, const Side& moving, std::size_t m, const Side& fixed,
+                         std::size_t f) const {
+  if (!circle()) return false;
+  if (const double furthest = std::max(-stops.low, stops.high); furthest < kPi) {
+    const double chord = 2.0 * std::sin(0.5 * furthest) * moving.faces[m].box.high[0];
+    if (moving.around[m].squaredExteriorDistance(fixed.around[f]) > chord * chord) return true;
+  }
+  const OrbitSector &of_m = moving.faces[m].sector, &of_f = fixed.faces[f].sector;
+  const double half = of_m.half + of_f.half;
+  if (half >= kPi) return false;
+  const double middle = wrapped(of_f.bearing - of_m.bearing);
   for (const double t : {middle - 2.0 * kPi, middle, middle + 2.0 * kPi})
-    if (t + half >= between_stops_.low && t - half <= between_stops_.high) return false;
+    if (t + half >= stops.low && t - half <= stops.high) return false;
   return true;
 }
 

@@ -71,20 +71,24 @@ void mark_touching(const std::vector<OrbitFace>& moving, const std::vector<std::
                    const std::vector<OrbitFace>& fixed, const std::vector<std::size_t>& of_f, double reach,
                    std::vector<char>& moving_touch, std::vector<char>& fixed_touch) {
   if (of_m.empty() || of_f.empty()) return;
+  const auto box_of = [](const OrbitFace& face) {
+    Eigen::AlignedBox3d box;
+    for (const Vec3& p : face.corners) box.extend(p);
+    return box;
+  };
   std::vector<CornerTree<3>::Corners> corners;
-  corners.reserve(of_f.size());
-  for (const std::size_t f : of_f) corners.push_back(fixed[f].corners);
+  std::vector<Eigen::AlignedBox3d> boxes;
+  for (const std::size_t f : of_f) corners.push_back(fixed[f].corners), boxes.push_back(box_of(fixed[f]));
   CornerTree<3> tree;
   tree.build(corners);
   for (std::size_t i = 0; i < of_m.size(); ++i) {
-    Eigen::AlignedBox3d box;
-    for (const Vec3& p : moving[of_m[i]].corners) box.extend(p);
+    Eigen::AlignedBox3d box = box_of(moving[of_m[i]]);
     box.min().array() -= reach, box.max().array() += reach;
     tree.any_leaf([&](std::size_t node) { return tree.box(node).intersects(box); },
                   [&](Index first, Index end) {
                     for (const Index e : tree.elements(first, end)) {
                       const auto k = static_cast<std::size_t>(e);
-                      if (moving_touch[i] && fixed_touch[k]) continue;
+                      if ((moving_touch[i] && fixed_touch[k]) || !box.intersects(boxes[k])) continue;
                       if (touch(moving[of_m[i]], fixed[of_f[k]], reach)) moving_touch[i] = fixed_touch[k] = 1;
                     }
                     return false;
@@ -166,15 +170,16 @@ void SlidingPlaces::add_curves(const OrbitFace& face, double reach, Curves& out)
 
 void SlidingPlaces::add_curve(const Vec3& from, const Vec3& to, const Vec3& normal, double reach, Curves& out) const {
   const auto angle = [](const Vec3& p) { return std::atan2(p.z(), p.y()); };
-  const bool straight = frame_.kind() == Kind::kTranslation;
-  const double start = straight ? 0.0 : angle(from);
-  const auto at = [&](const Vec3& p) {
-    const Orbit orbit = frame_.orbit_of(p);
-    if (frame_.kind() != Kind::kScrew) return orbit.plane;
-    const double turned = start + wrapped(angle(p) - start);
-    return std::array<double, 2>{orbit.plane[0], p.x() - frame_.pitch() * turned};
+  const auto turned = [](const Vec3& p, const Vec3& q) {
+    return std::atan2(p.y() * q.z() - p.z() * q.y(), p.y() * q.y() + p.z() * q.z());
   };
-  const double span = straight ? 0.0 : std::abs(wrapped(angle(to) - start));
+  const double start = frame_.kind() == Kind::kScrew ? angle(from) : 0.0;
+  const auto at = [&](const Vec3& p) {
+    if (frame_.kind() != Kind::kScrew) return frame_.plane_point(p).low;
+    const Orbit orbit = frame_.orbit_of(p);
+    return std::array<double, 2>{orbit.plane[0], p.x() - frame_.pitch() * (start + wrapped(angle(p) - start))};
+  };
+  const double span = frame_.kind() == Kind::kTranslation ? 0.0 : std::abs(turned(from, to));
   const int count = 1 + static_cast<int>(span / tuning().ranges.against.curve_turn);
   for (int i = 0; i < count; ++i) {
     const Vec3 p = from + (to - from) * i / count, q = from + (to - from) * (i + 1) / count;
@@ -204,8 +209,8 @@ bool SlidingPlaces::near(const Curves& curves, double first, double second) cons
 bool SlidingPlaces::holds(const Vec3& p) const {
   if (moving_.pieces.empty() || fixed_.pieces.empty()) return false;
   if (frame_.kind() != Kind::kScrew) {
-    const Orbit orbit = frame_.orbit_of(p);
-    return near(moving_, orbit.plane[0], orbit.plane[1]) && near(fixed_, orbit.plane[0], orbit.plane[1]);
+    const std::array<double, 2> at = frame_.plane_point(p).low;
+    return near(moving_, at[0], at[1]) && near(fixed_, at[0], at[1]);
   }
   const OrbitBox box = frame_.box_of(frame_.orbit_of(p));
   const double turn = 2.0 * kPi * std::abs(frame_.pitch());

@@ -50,7 +50,9 @@ struct FreeMotionOptions {
   /// rad (50°), 0 … π: a face that bends by less from the next one continues it. As in ContactRegionOptions.
   double crease_angle = kDefaultCreaseAngle;
   bool reachable_only = false;  ///< saves the work of finding `others`
-  void validate() const;        ///< @throws InvalidArgument naming the field
+  /// t, 0 in it or at its end: what stops a rotation beyond need not be found, which saves work; `reachable` may go on.
+  Interval within{};
+  void validate() const;  ///< @throws InvalidArgument naming the field
 };
 
 /// The end of a motion.
