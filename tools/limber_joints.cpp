@@ -316,12 +316,18 @@ Json freedom_json(const FreedomRange& f) {
   Json others = Json::array();
   for (const Interval& i : f.motion.others) others.push_back(interval_json(i));
   const auto stop = [](const MotionStop& s) { return s.body < 0 ? Json() : Json(s.body); };
+  Json coupled = Json::array();
+  for (const CoupledFreedom& c : f.coupled)
+    coupled.push_back({{"joint", c.joint},
+                       {"freedom", c.freedom},
+                       {"ratio", c.ratio.low <= c.ratio.high ? interval_json(c.ratio) : Json()}});
   return {{"freedom", f.freedom},
           {"reachable", interval_json(f.motion.reachable)},
           {"others", others},
           {"stopped_by", Json::array({stop(f.motion.low), stop(f.motion.high)})},
           {"tolerance", f.motion.tolerance},
-          {"overlapping", f.motion.overlapping}};
+          {"overlapping", f.motion.overlapping},
+          {"coupled", coupled}};
 }
 
 void fill_report(Json& report, const Work& work, const Kinematics& k) {

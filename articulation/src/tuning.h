@@ -282,10 +282,26 @@ struct AgainstTuning {
   double overlap_growth = 1.25;
 };
 
+/// Parts that engage, as gears do.
+struct EngagedTuning {
+  /// Part of the smaller body's diagonal, 0.01 … 0.1: parts engage where either stops the other both ways within this
+  /// way of the place where they touch. Teeth of a gear of 16 are 0.2 apart.
+  double play = 0.05;
+  /// rad, 0.02 … 0.2: the longest step. A tooth of a gear of 32 is as wide.
+  double longest_turn = 0.1;
+  /// Part of the play, 0.1 … 0.45: by how much its middle may miss the place foreseen; at 0.5 parts touch.
+  double most_miss = 0.375;
+  /// Part of the play, below `most_miss`: steps that miss by less are doubled.
+  double small_miss = 0.1;
+  /// Part of half the play, 1e-3 … 0.1: where steps as short do not go on, the way ends.
+  double least_step = 0.02;
+};
+
 /// Ranges of motion: where a path is blocked.
 struct RangesTuning {
   LimitsTuning limits{};
   AgainstTuning against{};
+  EngagedTuning engaged{};
 };
 
 struct Tuning {

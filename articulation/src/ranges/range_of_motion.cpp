@@ -1,9 +1,11 @@
 #include "limber/articulation/range_of_motion.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <numeric>
 #include <optional>
 
 #include "constants.h"
@@ -11,7 +13,9 @@
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 #include "number_text.h"
+#include "ranges/coupled_motion.h"
 #include "ranges/free_motion_of_bodies.h"
+#include "ranges/path_frame.h"
 #include "tuning.h"
 
 namespace limber {
@@ -21,6 +25,7 @@ using internal::degrees_text;
 using internal::kInfinity;
 using internal::number_text;
 using internal::OrbitBody;
+using internal::PathFrame;
 using internal::some_of;
 using internal::tuning;
 using Kind = MotionPath::Kind;
@@ -189,34 +194,43 @@ class Trial {
   double size_ = 0.0, sagitta_ = 0.0;
 };
 
+constexpr int kQuarters = 4;  // of the swings' directions: about y and z and against them
+
 /// How many paths are tried for a joint, at most.
 std::size_t path_count(JointSpec joint, const RangeOptions& options) {
-  const std::size_t swings = joint.type == JointType::kBall ? static_cast<std::size_t>(options.cone_directions) +
-                                                                  2 * tuning().ranges.limits.cone_refinements
-                                                            : 0;
+  const std::size_t swings =
+      joint.type == JointType::kBall
+          ? static_cast<std::size_t>(options.cone_directions - std::gcd(options.cone_directions, kQuarters)) +
+                2 * tuning().ranges.limits.cone_refinements
+          : 0;
   return paths_of(joint).size() + swings;
 }
 
-/// The least swing of the x axis over all directions. Swings by an angle about cos ψ y + sin ψ z.
+/// The least swing of the x axis over all directions. Swings by an angle about cos ψ y + sin ψ z, those of the joint's
+/// limits about y and z among them. Stops beyond the least so far do not matter.
 double cone_of(const Trial& trial, const JointSpec& joint, const RangeOptions& options,
                const std::function<void()>& path_done) {
   FreeMotionOptions motion = options.motion;
   motion.reachable_only = true;
+  double least = kInfinity, at = 0.0;
   const auto swing = [&](double psi) {
     const Vec3 axis = std::cos(psi) * axis_of(joint, 1) + std::sin(psi) * axis_of(joint, 2);
-    const double high = trial.along(rotation(joint, axis), motion).reachable.high;
+    motion.within = {0.0, least};
+    if (const double high = trial.along(rotation(joint, axis), motion).reachable.high; high < least)
+      least = high, at = psi;
     path_done();
-    return high;
   };
+  const auto& euler = joint.limits.euler;
+  const std::array<double, kQuarters> known{euler[1].high, euler[2].high, -euler[1].low, -euler[2].low};
+  for (std::size_t i = 0; i < known.size(); ++i)
+    if (known[i] < least) least = known[i], at = 0.5 * std::numbers::pi * static_cast<double>(i);
   const double step = 2.0 * std::numbers::pi / options.cone_directions;
-  double least = kInfinity, at = 0.0;
   for (int i = 0; i < options.cone_directions; ++i)
-    if (const double angle = swing(i * step); angle < least) least = angle, at = i * step;
+    if (kQuarters * i % options.cone_directions != 0) swing(i * step);
   if (least == kInfinity) return least;
   double d = 0.5 * step;
   for (std::size_t i = 0; i < tuning().ranges.limits.cone_refinements; ++i, d *= 0.5)
-    for (const double psi : {at - d, at + d})
-      if (const double angle = swing(psi); angle < least) least = angle, at = psi;
+    for (const double psi : {at - d, at + d}) swing(psi);
   return std::min(least, std::numbers::pi);
 }
 
@@ -247,22 +261,33 @@ std::string range_sentence(const Assembly& assembly, const FreedomRange& range) 
   return text + ".";
 }
 
-double width(const Interval& interval) { return interval.high - interval.low; }
-
-/// The joint's frame with the axis of this number as x; the frame stays right-handed.
-JointFrame with_x(const JointFrame& frame, int axis) {
-  JointFrame out{.origin = frame.origin, .axes = frame.axes};
-  for (int i = 0; i < 3; ++i) out.axes.col(i) = frame.axes.col((i + axis) % 3);
-  return out;
+/// The simplest fraction of an interval of positive numbers: the first that the Stern-Brocot tree has within it.
+std::pair<int, int> simplest_fraction(const Interval& within) {
+  std::array<int, 2> low{0, 1}, high{1, 0};
+  for (;;) {
+    const std::array<int, 2> middle{low[0] + high[0], low[1] + high[1]};
+    const double value = static_cast<double>(middle[0]) / middle[1];
+    if (value >= within.low && value <= within.high) return {middle[0], middle[1]};
+    (value < within.low ? low : high) = middle;
+  }
 }
 
-JointSpec one_freedom(const JointSpec& joint, JointType type, int axis, const Interval& limit) {
-  JointSpec out{.type = type, .frame = with_x(joint.frame, axis)};
-  (type == JointType::kRevolute ? out.limits.rotation : out.limits.translation[0]) = limit;
-  return out;
+/// @param angles both freedoms are rotations
+std::string coupling_sentence(const Assembly& assembly, const DetectedJoint& other, const FreedomRange& freedom,
+                              const CoupledFreedom& c, bool angles) {
+  const auto name = [&](Index i) { return "\"" + assembly.components[static_cast<std::size_t>(i)].name + "\""; };
+  std::string text = freedom.freedom + ": coupled with joint " + std::to_string(c.joint) + ", " + name(other.a) +
+                     " - " + name(other.b) + ", ";
+  const Interval& r = c.ratio;
+  if (!(r.low <= r.high) || r.low * r.high <= 0.0) return text + "whose speed changes on the way.";
+  text += "which goes " + number_text(0.5 * (r.low + r.high), 4) + " times as far";
+  if (angles) {
+    const bool back = r.high < 0.0;
+    const auto [over, under] = simplest_fraction(back ? Interval{-r.high, -r.low} : r);
+    text += std::string(" (") + (back ? "-" : "") + std::to_string(over) + "/" + std::to_string(under) + ")";
+  }
+  return text + ".";
 }
-
-JointSpec fixed_of(const JointSpec& joint) { return {.type = JointType::kFixed, .frame = joint.frame}; }
 
 }  // namespace
 
@@ -282,99 +307,182 @@ JointSides joint_sides(Index components, const std::vector<DetectedJoint>& joint
   return JointGraph(components, joints, joint).sides(joints[joint]);
 }
 
-JointSpec without_narrow_freedoms(JointSpec joint, double min_rotation, double min_translation,
-                                  std::vector<std::string>& reasons) {
-  const auto narrow_turn = [&](const Interval& i) { return width(i) < min_rotation; };
-  const auto narrow_slide = [&](const Interval& i) { return width(i) < min_translation; };
-  const auto becomes = [&](JointSpec other, const std::string& why) {
-    reasons.push_back(why + ": the " + std::string(to_string(joint.type)) + " joint is " +
-                      std::string(to_string(other.type)) + ".");
-    return other;
-  };
-  const JointLimits& l = joint.limits;
-  switch (joint.type) {
-    case JointType::kFixed:
-      break;
-    case JointType::kRevolute:
-      if (narrow_turn(l.rotation))
-        return becomes(fixed_of(joint), "It turns by " + degrees_text(width(l.rotation)) + " only");
-      break;
-    case JointType::kPrismatic:
-      if (narrow_slide(l.translation[0]))
-        return becomes(fixed_of(joint), "It slides by " + number_text(width(l.translation[0])) + " only");
-      break;
-    case JointType::kCylindrical: {
-      if (joint.pitch != 0.0) {
-        if (narrow_turn(l.rotation))
-          return becomes(fixed_of(joint), "It screws by " + degrees_text(width(l.rotation)) + " only");
-        break;
-      }
-      const bool turns = !narrow_turn(l.rotation), slides = !narrow_slide(l.translation[0]);
-      if (!turns && !slides) return becomes(fixed_of(joint), "It neither turns nor slides");
-      if (!slides)
-        return becomes(one_freedom(joint, JointType::kRevolute, 0, l.rotation),
-                       "It slides by " + number_text(width(l.translation[0])) + " only");
-      if (!turns)
-        return becomes(one_freedom(joint, JointType::kPrismatic, 0, l.translation[0]),
-                       "It turns by " + degrees_text(width(l.rotation)) + " only");
-      break;
-    }
-    case JointType::kPlanar: {
-      const bool x = !narrow_slide(l.translation[0]), y = !narrow_slide(l.translation[1]),
-                 turns = !narrow_turn(l.rotation);
-      if (!x && !y && !turns) return becomes(fixed_of(joint), "It neither slides nor turns");
-      if (!x && !y) return becomes(one_freedom(joint, JointType::kRevolute, 2, l.rotation), "It does not slide");
-      if (!turns && x != y)
-        return becomes(one_freedom(joint, JointType::kPrismatic, x ? 0 : 1, l.translation[x ? 0 : 1]),
-                       "It slides one way only");
-      break;
-    }
-    case JointType::kBall: {
-      const auto free =
-          std::count_if(l.euler.begin(), l.euler.end(), [&](const Interval& i) { return !narrow_turn(i); });
-      if (free == 0) return becomes(fixed_of(joint), "It does not turn");
-      if (free > 1) break;
-      for (int axis = 0; axis < 3; ++axis)
-        if (const Interval& turn = l.euler[static_cast<std::size_t>(axis)]; !narrow_turn(turn))
-          return becomes(one_freedom(joint, JointType::kRevolute, axis, turn), "It turns about one axis only");
-    }
-  }
-  return joint;
-}
-
 namespace {
 
-RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodies, const JointGraph& graph,
-                       const DetectedJoint& joint, const RangeOptions& options,
-                       const std::function<void()>& path_done) {
-  RangeOfMotion out{.joint = joint.joint, .freedoms = {}, .reasons = {}};
+/// All joints of an assembly, to be tried.
+struct Task {
+  const Assembly& assembly;
+  const std::vector<DetectedJoint>& joints;
+  const RangeOptions& options;
+  std::vector<OrbitBody> bodies = bodies_of(assembly);
+  JointGraph graph{static_cast<Index>(assembly.components.size()), joints};
+
+  Trial trial(std::size_t joint, JointSides sides) const {
+    return {assembly, bodies, joints[joint], std::move(sides), options.motion.crease_angle};
+  }
+  JointSides sides(std::size_t joint) const { return graph.sides(joints[joint]); }
+};
+
+/// The freedoms of a joint as they are while all other joints stand at 0.
+RangeOfMotion tried(const Task& task, std::size_t joint, const std::function<void()>& path_done) {
+  RangeOfMotion out{.joint = task.joints[joint].joint, .freedoms = {}, .reasons = {}};
   out.joint.limits = {};
   if (out.joint.type == JointType::kFixed) return out;
-  const Trial trial(assembly, bodies, joint, graph.sides(joint), options.motion.crease_angle);
+  const Trial trial = task.trial(joint, task.sides(joint));
   for (const NamedPath& p : paths_of(out.joint)) {
-    out.freedoms.push_back({p.freedom, trial.along(p.path, options.motion)});
+    out.freedoms.push_back({p.freedom, trial.along(p.path, task.options.motion), {}});
     path_done();
     *p.limit = out.freedoms.back().motion.reachable;
-    out.reasons.push_back(range_sentence(assembly, out.freedoms.back()));
   }
-  if (out.joint.type == JointType::kBall) {
-    out.joint.limits.cone = cone_of(trial, out.joint, options, path_done);
-    out.reasons.push_back("swing of x: " +
-                          (out.joint.limits.cone < kInfinity
-                               ? "at least " + degrees_text(out.joint.limits.cone) + " in every direction."
-                               : std::string("nothing stops it.")));
-  }
-  if (out.joint.type == JointType::kCylindrical && out.joint.pitch != 0.0) {
-    const Interval turn = out.joint.limits.rotation;
-    const auto [low, high] = std::minmax({out.joint.pitch * turn.low, out.joint.pitch * turn.high});
-    out.joint.limits.translation[0] = {low, high};
-  }
-  if (std::any_of(out.freedoms.begin(), out.freedoms.end(), [](const FreedomRange& f) { return f.motion.overlapping; }))
-    out.reasons.push_back("The parts overlap as read by more than " +
-                          number_text(out.freedoms.front().motion.tolerance) + ": such places count as no stop.");
-  out.joint =
-      without_narrow_freedoms(out.joint, options.min_rotation, options.min_translation * trial.size(), out.reasons);
+  if (out.joint.type == JointType::kBall) out.joint.limits.cone = cone_of(trial, out.joint, task.options, path_done);
   return out;
+}
+
+// Coupled freedoms ----------------------------------------------------------------------------------------------------
+
+/// Freedoms that stop each other within a little play.
+class Couplings {
+ public:
+  /// @param tried per joint
+  Couplings(const Task& task, const std::vector<RangeOfMotion>& tried) : task_(task), tried_(tried) {}
+
+  /// Follows the freedoms of a joint that others engage. @param range as tried
+  void couple(std::size_t joint, RangeOfMotion& range) const {
+    for (std::size_t f = 0; f < range.freedoms.size(); ++f) {
+      const Freedom first{joint, f};
+      const std::vector<Freedom> partners = partners_of(first);
+      if (partners.empty()) continue;
+      const FreeMotion own = without(first, partners);
+      FreedomRange& freedom = range.freedoms[f];
+      Interval reachable = own.reachable;
+      for (const Freedom& second : partners) {
+        const internal::CoupledMotion m = internal::coupled_motion(
+            part(first, second, own.reachable), part(second, first, without(second, partners_of(second)).reachable),
+            task_.options.motion);
+        if (!m.engaged) continue;
+        freedom.coupled.push_back({second.joint, second.freedom, m.ratio});
+        reachable = {std::max(reachable.low, m.reachable.low), std::min(reachable.high, m.reachable.high)};
+      }
+      if (freedom.coupled.empty()) continue;
+      freedom.motion.others.clear();
+      if (reachable.low == own.reachable.low) freedom.motion.low = own.low;
+      if (reachable.high == own.reachable.high) freedom.motion.high = own.high;
+      freedom.motion.reachable = *paths_of(range.joint)[f].limit = reachable;
+    }
+  }
+
+ private:
+  struct Freedom {
+    std::size_t joint, freedom;
+  };
+  MotionPath path(const Freedom& f) const {
+    JointSpec joint = task_.joints[f.joint].joint;
+    return paths_of(joint)[f.freedom].path;
+  }
+  double size(std::size_t joint) const {
+    const auto diagonal = [&](Index c) { return task_.assembly.components[static_cast<std::size_t>(c)].diagonal; };
+    return std::min(diagonal(task_.joints[joint].a), diagonal(task_.joints[joint].b));
+  }
+  /// True if a motion ends both ways within the play of parts that engage.
+  bool is_play(const Freedom& f, const FreeMotion& m) const {
+    if (m.low.body < 0 || m.high.body < 0) return false;
+    const PathFrame frame(path(f));
+    const double speed = frame.velocity(frame.to_path(m.high.point)).norm();
+    return speed * (m.reachable.high - m.reachable.low) <= tuning().ranges.engaged.play * size(f.joint);
+  }
+  bool may_engage(const Freedom& f) const {
+    const JointType type = task_.joints[f.joint].joint.type;
+    return type != JointType::kBall && type != JointType::kPlanar &&
+           is_play(f, tried_[f.joint].freedoms[f.freedom].motion);
+  }
+  /// What a joint moves that another joint does not hold, with the joint's path for it.
+  std::optional<std::pair<std::vector<Index>, MotionPath>> branch(const Freedom& of, const Freedom& other) const;
+  internal::EngagedPart part(const Freedom& of, const Freedom& other, const Interval& limits) const {
+    auto [which, path] = *branch(of, other);
+    return {some_of(task_.bodies, which), path, limits};
+  }
+  std::vector<Freedom> partners_of(const Freedom& first) const;
+  FreeMotion without(const Freedom& f, const std::vector<Freedom>& partners) const;
+
+  const Task& task_;
+  const std::vector<RangeOfMotion>& tried_;
+};
+
+std::optional<std::pair<std::vector<Index>, MotionPath>> Couplings::branch(const Freedom& of,
+                                                                           const Freedom& other) const {
+  const JointSides sides = task_.sides(of.joint);
+  const DetectedJoint& o = task_.joints[other.joint];
+  const auto has = [&](const std::vector<Index>& side) {
+    return std::ranges::binary_search(side, o.a) && std::ranges::binary_search(side, o.b);
+  };
+  MotionPath along = path(of);
+  if (has(sides.fixed)) return std::pair(sides.moving, along);
+  if (!has(sides.moving)) return {};
+  along.axis = -along.axis;  // it is the other side that moves, the other way
+  return std::pair(sides.fixed, along);
+}
+
+std::vector<Couplings::Freedom> Couplings::partners_of(const Freedom& first) const {
+  std::vector<Freedom> out;
+  if (!may_engage(first)) return out;
+  const auto box_of = [](const internal::EngagedPart& part) {
+    Eigen::AlignedBox3d box;
+    for (const OrbitBody& body : part.bodies) box.extend(body.box);
+    return box;
+  };
+  for (std::size_t j = 0; j < tried_.size(); ++j)
+    for (std::size_t f = 0; f < tried_[j].freedoms.size(); ++f) {
+      const Freedom second{j, f};
+      if (j == first.joint || !may_engage(second) || !branch(first, second) || !branch(second, first)) continue;
+      const internal::EngagedPart a = part(first, second, {}), b = part(second, first, {});
+      if (!box_of(a).intersects(box_of(b))) continue;
+      const auto alone = internal::stopped_both_ways(a, b, task_.options.motion);
+      if (alone && is_play(first, *alone)) out.push_back(second);
+    }
+  return out;
+}
+
+/// A freedom's motion while what engages it is away.
+FreeMotion Couplings::without(const Freedom& f, const std::vector<Freedom>& partners) const {
+  JointSides sides = task_.sides(f.joint);
+  for (const Freedom& partner : partners) {
+    const std::vector<Index> away = branch(partner, f)->first;
+    for (auto* side : {&sides.moving, &sides.fixed})
+      std::erase_if(*side, [&](Index c) { return std::ranges::binary_search(away, c); });
+  }
+  return task_.trial(f.joint, std::move(sides)).along(path(f), task_.options.motion);
+}
+
+// Telling -------------------------------------------------------------------------------------------------------------
+
+/// Adds the reasons, and takes out freedoms that are too narrow.
+void tell(const Task& task, std::size_t joint, RangeOfMotion& range) {
+  if (range.joint.type == JointType::kFixed) return;
+  for (const FreedomRange& freedom : range.freedoms) {
+    range.reasons.push_back(range_sentence(task.assembly, freedom));
+    for (const CoupledFreedom& c : freedom.coupled) {
+      JointSpec other = task.joints[c.joint].joint;
+      const bool angles = is_angle(freedom.freedom) && is_angle(paths_of(other)[c.freedom].freedom);
+      range.reasons.push_back(coupling_sentence(task.assembly, task.joints[c.joint], freedom, c, angles));
+    }
+  }
+  if (range.joint.type == JointType::kBall)
+    range.reasons.push_back("swing of x: " +
+                            (range.joint.limits.cone < kInfinity
+                                 ? "at least " + degrees_text(range.joint.limits.cone) + " in every direction."
+                                 : std::string("nothing stops it.")));
+  if (range.joint.type == JointType::kCylindrical && range.joint.pitch != 0.0) {
+    const Interval turn = range.joint.limits.rotation;
+    const auto [low, high] = std::minmax({range.joint.pitch * turn.low, range.joint.pitch * turn.high});
+    range.joint.limits.translation[0] = {low, high};
+  }
+  const auto overlaps = [](const FreedomRange& f) { return f.motion.overlapping; };
+  if (std::any_of(range.freedoms.begin(), range.freedoms.end(), overlaps))
+    range.reasons.push_back("The parts overlap as read by more than " +
+                            number_text(range.freedoms.front().motion.tolerance) + ": such places count as no stop.");
+  const RangeOptions& o = task.options;
+  range.joint = without_narrow_freedoms(range.joint, o.min_rotation,
+                                        o.min_translation * task.trial(joint, task.sides(joint)).size(), range.reasons);
 }
 
 }  // namespace
@@ -382,24 +490,26 @@ RangeOfMotion range_of(const Assembly& assembly, std::span<const OrbitBody> bodi
 RangeOfMotion range_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints, std::size_t joint,
                               const RangeOptions& options) {
   options.validate();
-  const JointGraph graph(static_cast<Index>(assembly.components.size()), joints);
   if (joint >= joints.size())
     throw InvalidArgument("range_of_motion: joint " + std::to_string(joint) + " of " + std::to_string(joints.size()));
-  return range_of(assembly, bodies_of(assembly), graph, joints[joint], options, [] {});
+  return ranges_of_motion(assembly, joints, options).at(joint);
 }
 
 std::vector<RangeOfMotion> ranges_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
                                             const RangeOptions& options, Jobs& jobs) {
   options.validate();
-  const std::vector<OrbitBody> bodies = bodies_of(assembly);
-  const JointGraph graph(static_cast<Index>(assembly.components.size()), joints);
-  std::vector<RangeOfMotion> out(joints.size());
+  const Task task{assembly, joints, options};
+  std::vector<RangeOfMotion> alone(joints.size());
   std::size_t paths = 0;
   for (const DetectedJoint& j : joints) paths += path_count(j.joint, options);
   internal::CountedProgress progress(paths, options.progress);
   jobs.parallel_for(joints.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t j = begin; j < end; ++j)
-      out[j] = range_of(assembly, bodies, graph, joints[j], options, [&] { progress.done(); });
+    for (std::size_t j = begin; j < end; ++j) alone[j] = tried(task, j, [&] { progress.done(); });
+  });
+  std::vector<RangeOfMotion> out = alone;
+  const Couplings couplings(task, alone);
+  jobs.parallel_for(joints.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t j = begin; j < end; ++j) couplings.couple(j, out[j]), tell(task, j, out[j]);
   });
   return out;
 }

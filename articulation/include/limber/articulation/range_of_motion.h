@@ -13,6 +13,9 @@
 /// (screw), rotations about x, y, z and swings of x in every direction, the least of which is the cone (ball). Motions
 /// of several freedoms at once may end earlier. free_motion.h says what stops a motion.
 ///
+/// Gears, racks and the like stop each other within their play. Where two parts, each with a rotation, translation or
+/// screw of its own, do so, either is followed while the other goes along, and FreedomRange::coupled tells the ratio.
+///
 /// A freedom narrower than `min_rotation` or `min_translation` is none, and the joint becomes the type that is left:
 /// cylindrical revolute or prismatic, planar prismatic or revolute, ball revolute, any of them fixed.
 ///
@@ -49,10 +52,20 @@ struct JointSides {
 /// @param components how many there are. @param joint of `joints`. @throws InvalidArgument if an index is out of range
 JointSides joint_sides(Index components, const std::vector<DetectedJoint>& joints, std::size_t joint);
 
+/// A freedom of another joint that goes along, as the teeth of two gears let each other move.
+struct CoupledFreedom {
+  std::size_t joint = 0;    ///< the other
+  std::size_t freedom = 0;  ///< of its RangeOfMotion::freedoms
+  /// Of its t to this one's: all at which both run evenly without contact over the whole range. low > high: at none; it
+  /// changes on the way, as with a cam
+  Interval ratio;
+};
+
 /// One freedom of a joint, as it was tried.
 struct FreedomRange {
-  std::string freedom;  ///< "rotation about x", "translation along y", …
-  FreeMotion motion;    ///< MotionStop::body: a component
+  std::string freedom;                  ///< "rotation about x", "translation along y", …
+  FreeMotion motion;                    ///< MotionStop::body: a component
+  std::vector<CoupledFreedom> coupled;  ///< what goes along; mostly empty
 };
 
 struct RangeOfMotion {
@@ -61,6 +74,7 @@ struct RangeOfMotion {
   std::vector<std::string> reasons;    ///< sentences: what stops each freedom, what became of it
 };
 
+/// One of ranges_of_motion(), which it takes as long as: joints that engage depend on each other.
 /// @throws InvalidArgument if `joint` is out of range or an option is
 RangeOfMotion range_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints, std::size_t joint,
                               const RangeOptions& options = {});
