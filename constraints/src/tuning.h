@@ -92,10 +92,6 @@ struct EnergyTuning {
   /// Gains above so many energies at hand are nonsense, not motion to be slowed: no digits would be left. [path]
   double nonsense = 10.0;
   double recovery_speed = 1.0;  ///< m/s: what is out of place brings even bodies at rest together about this fast
-  /// Part of the impulses that is refused at first: of contacts alone, as half of what holds a pile would be half a
-  /// fall; of others. Each refusal is twice the one before, up to the most.
-  double refused_of_contacts = 0.01, refused_of_joints = 0.5, refused_at_most = 0.5;
-  double least_accepted = 4e-4;  ///< of the impulses; less is none. [path] Ends the refusals
 };
 
 /// Small steps of game contact (docs/derivations/small-steps.md).

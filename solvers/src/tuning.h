@@ -29,8 +29,7 @@ struct EquilibriumTuning {
 
 /// LeastSquaresSolver.
 struct LeastSquaresTuning {
-  double rank = 1e-11;            ///< of the largest pivot: (singular value ratio)². Less is zero. [path]
-  double least_mobility = 1e-13;  ///< of the largest diagonal: rows that move less are not scaled up
+  double rank = 1e-11;  ///< of the largest pivot: (singular value ratio)². Less is zero. [path]
 };
 
 struct SolversTuning {

@@ -39,7 +39,6 @@ class Pointshell {
   bool resolved() const { return resolved_; }
   const CollisionSurface& surface() const { return *surface_; }
   Index modes() const { return surface_->modes(); }
-  bool model_is_rigid() const { return surface_->model() == nullptr; }  ///< of a rigid shape
 
   /// Distances of the rest shape. @pre resolved()
   DistanceView distance() const;
@@ -55,7 +54,6 @@ class Pointshell {
   /// Whether the surface turns outwards at an edge at rest: others touch no edge.
   bool sticks_out(Index edge) const { return sticks_out_[static_cast<std::size_t>(edge)]; }
   std::size_t clusters() const { return sample_clusters_.count; }
-  std::size_t edge_entries() const { return edges_.size(); }
   std::size_t bytes() const;  ///< of memory, the surface not counted
 
  private:

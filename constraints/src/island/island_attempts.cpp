@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../tuning.h"
 #include "island_impl.h"
 
 namespace limber::internal {
@@ -36,25 +35,14 @@ IslandReport IslandParts::guard(const StepPart& part, IslandReport done) {
 }
 
 /// Where the rows did not come together and have left bodies bent, or loads have moved to contacts that have to be
-/// filled first: less of the impulses, in the end none. The free step has the energy it began with. Where contacts
-/// alone act, as little less as will do: half of what holds a pile would be half a fall.
+/// filled first: the free step, which has the energy that it began with.
 void IslandParts::refuse_impulses(IslandReport& report) {
-  constexpr const EnergyTuning& tuning = kConstraintsTuning.energy;
   report.accepted = false;
   report.attempts[StepAttempt::kRefused] = 1;
-  const double first = step_.contacts_alone ? tuning.refused_of_contacts : tuning.refused_of_joints;
-  for (double refused = first, accepted = 1.0; accepted > 0.0;
-       refused = std::min(2.0 * refused, tuning.refused_at_most)) {
-    accepted *= 1.0 - refused;
-    if (accepted < tuning.least_accepted) accepted = 0.0;
-    for (std::size_t i = 0; i < step_.size(); ++i) {
-      // not times 0: they need not be finite
-      step_.f[i] = accepted == 0.0 ? 0.0 : (1.0 - refused) * step_.f[i];
-      step_.reaction[i] = accepted == 0.0 ? 0.0 : (1.0 - refused) * step_.reaction[i];
-    }
-    step_.predict();
-    if (!(energy_.close(step_, report) > 0.0)) return;
-  }
+  std::ranges::fill(step_.f, 0.0);
+  std::ranges::fill(step_.reaction, 0.0);
+  step_.predict();
+  energy_.close(step_, report);
 }
 
 }  // namespace limber::internal

@@ -46,7 +46,11 @@ class IslandParts : public IslandSolver {
   /// Makes step_ the part at hand. @param contacts_react as IslandStep::begin()
   void begin(const StepPart& part, bool contacts_react);
 
+  /// Of what find() found, where the energy would rise by it: none, in a free step.
+  virtual void refuse_impulses(IslandReport& report);
+
   IslandStep step_;  // the part at hand
+  IslandEnergy energy_;
 
  private:
   // The step in parts.
@@ -59,9 +63,7 @@ class IslandParts : public IslandSolver {
   // A part.
   IslandReport find_guarded(const StepPart& part);
   IslandReport guard(const StepPart& part, IslandReport done);
-  void refuse_impulses(IslandReport& report);
 
-  IslandEnergy energy_;
   std::vector<double> slip_, impulses_;  // by row
   StepInParts parts_;                    // the step at hand
   StageTimes times_;                     // of the step at hand

@@ -191,9 +191,4 @@ void IslandStep::linearise(StepTime when, ConstraintRows& to) const {
   for (Constraint* constraint : part.constraints) constraint->add_rows(states, when, length(), to);
 }
 
-void IslandStep::linearise_end() {
-  bodies.place(StepTime::kEnd);
-  linearise(StepTime::kEnd, end_rows);
-}
-
 }  // namespace limber::internal

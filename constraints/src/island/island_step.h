@@ -104,7 +104,6 @@ struct IslandStep {
   void predict_under_loads();
   /// Linearises the rows elsewhere than at the start.
   void linearise(StepTime when, ConstraintRows& to) const;
-  void linearise_end();
   void measure(StepTime when, std::vector<double>& into) const;
 
   /// act(side, local, again) for the bodies of a row; again: the one before was the same body.

@@ -5,8 +5,10 @@
 namespace limber::internal {
 namespace {
 
-constexpr int kMostCuts = 4;            // of a step. Bounds the work
-constexpr double kShortestPart = 1e-3;  // of the step: no cut makes a part that is shorter
+constexpr double kFirstRefused = 0.01, kMostRefused = 0.5;  // parts of impulses
+constexpr double kLeastKept = 4e-4;                         // of impulses; less is none
+constexpr int kMostCuts = 4;                                // of a step. Bounds the work
+constexpr double kShortestPart = 1e-3;                      // of the step: no cut makes a part that is shorter
 
 /// Whether a step may be cut where bodies touch: free ones that nothing but contacts acts on.
 bool allows_cuts(const StepPart& part) {
@@ -41,11 +43,29 @@ IslandReport ProgramIslands::find(const StepPart& part) {
   if (by_velocities) touch_.solve(step_, reaction_, rule_, found_);
   reaction_.find(step_, StepTime::kStart);
   done.accepted = newton_.solve(step_, rule_, done, found_) == SolveStatus::kSolved;
-  step_.linearise_end();
+  step_.bodies.place(StepTime::kEnd);
+  step_.linearise(StepTime::kEnd, step_.end_rows);
   if (by_velocities) touch_.hold_forces(step_.end_rows, step_.length());
   reaction_.find(step_, StepTime::kEnd);
   load_end(step_);
   return done;
+}
+
+/// As little less as will do, each time twice as much less, in the end none: programs often give a little energy, and
+/// half of what holds a pile would be half a fall.
+void ProgramIslands::refuse_impulses(IslandReport& report) {
+  for (double refused = step_.contacts_alone ? kFirstRefused : kMostRefused, kept = 1.0; kept > kLeastKept;
+       refused = std::min(2.0 * refused, kMostRefused)) {
+    kept *= 1.0 - refused;
+    for (double& f : step_.f) f *= 1.0 - refused;
+    for (double& f : step_.reaction) f *= 1.0 - refused;
+    step_.predict();
+    if (energy_.close(step_, report) > 0.0) continue;
+    report.accepted = false;
+    report.attempts[StepAttempt::kRefused] = 1;
+    return;
+  }
+  IslandParts::refuse_impulses(report);
 }
 
 /// The velocity program acts at the touch.

@@ -24,6 +24,7 @@ class ProgramIslands final : public IslandParts {
   IslandReport find(const StepPart& part) override;
   void taken() override { programs_->add(found_); }
   double next_cut(const StepPart& part, int cuts) override;
+  void refuse_impulses(IslandReport& report) override;
 
  private:
   ContactRule rule_;
