@@ -106,7 +106,7 @@ class EdgeBlock {
       const Points slope = GatherSamples(bounds.slope, end);
       const auto turns = TurnsUp(hn::Mul(out, Dot(slope, ways_.Across())),
                                  hn::Mul(out, Dot(centre.slope, ways_.Across())), Level(length));
-      return hn::And(near, hn::Or(through, hn::Or(hn::Ne(slope.x, slope.x), turns)));
+      return hn::And(near, hn::Or(through, hn::Or(hn::IsNaN(slope.x), turns)));
     };
     return Bits(hn::And(hn::Gt(length, zero), hn::Or(half(from_, 1.0f), half(to_, -1.0f))));
   }
