@@ -91,17 +91,22 @@ class EdgeBlock {
         ways_(query, Placed(query, a_), Placed(query, b_)) {}
 
   // Edges of which a half may have a point that is looked for, a bit each.
-  HWY_ATTR unsigned Look(const SampleBounds& bounds) const {
+  HWY_ATTR unsigned Look(const ShellView& shell, const SampleBounds& bounds) const {
     const Floats d;
-    const F length = ways_.Length(), zero = hn::Zero(d);
-    const F motion = hn::Max(hn::GatherIndex(d, bounds.motion, from_), hn::GatherIndex(d, bounds.motion, to_));
-    const F most = hn::MulAdd(All(2.0f), hn::Add(All(query_.reach), motion), hn::Mul(All(0.5f), length));
+    const F length = ways_.Length(), zero = hn::Zero(d), half_way = All(0.5f);
     const Distance centre = DistanceOf(query_.field, ways_.Centre());
     const auto inside = hn::Lt(centre.value, zero);
-    // Distances change by no more than the way. So may a slope that is not known.
-    const auto half = [&](I end, float way) HWY_ATTR {
-      const F distance = hn::GatherIndex(d, bounds.distance, end), out = hn::IfThenElse(inside, All(-way), All(way));
-      const auto near = hn::Le(hn::Add(hn::Abs(distance), hn::Abs(centre.value)), most);
+    const Points of_a = Moved(shell, a_, from_), of_b = Moved(shell, b_, to_), apart = Difference(of_b, of_a);
+    const Points then = Added(ways_.Across(), apart);
+    const F longest = hn::Max(length, hn::Sqrt(Dot(then, then)));
+    const Points way{Mix(of_a.x, of_b.x, half_way), Mix(of_a.y, of_b.y, half_way), Mix(of_a.z, of_b.z, half_way)};
+    const F clear =
+        hn::IfThenElse(inside, hn::Neg(centre.value), ClearOnTheWay(query_, centre.value, ways_.Centre(), way));
+    const F most = hn::MulAdd(half_way, longest, hn::Sub(All(2.0f * query_.reach), clear));
+    // Distances change by no more than the way. A slope that is not known may turn.
+    const auto half = [&](I end, float from) HWY_ATTR {
+      const F distance = hn::GatherIndex(d, bounds.distance, end), out = hn::IfThenElse(inside, All(-from), All(from));
+      const auto near = hn::Le(hn::GatherIndex(d, bounds.clear, end), most);
       const auto through = hn::Xor(inside, hn::Lt(distance, zero));
       const Points slope = GatherSamples(bounds.slope, end);
       const auto turns = TurnsUp(hn::Mul(out, Dot(slope, ways_.Across())),
@@ -198,39 +203,27 @@ class EdgeBlock {
   Ways ways_;
 };
 
-// Distances change by no more than the way: what is farther from the surface at both ends than half of an edge does not
-// reach it, from neither side. A bit each.
+// Distances change by no more than the way: an edge whose ends stay clear of the surface by more than its length
+// together does not reach it, from neither side. A bit each.
+// @param longest no edge of these is longer, now
 HWY_INLINE HWY_ATTR unsigned MayReach(const FieldQuery& query, const ShellView& shell, const SampleBounds& bounds,
-                                      I from, I to) {
+                                      I from, I to, float longest) {
   const Floats d;
-  const F apart =
-      hn::Add(hn::Abs(hn::GatherIndex(d, bounds.distance, from)), hn::Abs(hn::GatherIndex(d, bounds.distance, to)));
-  const F motion = hn::Max(hn::GatherIndex(d, bounds.motion, from), hn::GatherIndex(d, bounds.motion, to));
+  const F clear = hn::Add(hn::GatherIndex(d, bounds.clear, from), hn::GatherIndex(d, bounds.clear, to));
+  const F over = hn::Sub(clear, All(2.0f * query.reach));
+  if (hn::AllFalse(d, hn::Le(over, All(longest + 2.0f * query.swing)))) return 0;
   const Points across = Difference(GatherSamples(shell.coordinates, to), GatherSamples(shell.coordinates, from));
-  const F within = hn::Sub(apart, hn::MulAdd(All(2.0f), motion, All(2.0f * query.reach)));
-  return Bits(hn::Or(hn::Le(within, hn::Zero(d)), hn::Le(hn::Mul(within, within), Dot(across, across))));
-}
-
-// The same with the centre too, seen where it is: no point of the field's body is displaced farther than its flex.
-HWY_ATTR unsigned MayReachFromCentre(const FieldQuery& query, const ShellView& shell, const SampleBounds& bounds,
-                                     const EdgeQueue& queue) {
-  const Floats d;
-  const I from = hn::Load(Ints(), queue.ends[0]), to = hn::Load(Ints(), queue.ends[1]);
-  const Points a = GatherSamples(shell.coordinates, from), across = Difference(GatherSamples(shell.coordinates, to), a);
-  const F half = All(0.5f);
-  const Points centre{hn::MulAdd(half, across.x, a.x), hn::MulAdd(half, across.y, a.y),
-                      hn::MulAdd(half, across.z, a.z)};
-  const F least = hn::Sub(hn::Abs(DistanceOf(query.field, Placed(query, centre)).value), All(query.flex));
-  const F nearest =
-      hn::Min(hn::Abs(hn::GatherIndex(d, bounds.distance, from)), hn::Abs(hn::GatherIndex(d, bounds.distance, to)));
-  const F motion = hn::Max(hn::GatherIndex(d, bounds.motion, from), hn::GatherIndex(d, bounds.motion, to));
-  const F most = hn::MulAdd(All(2.0f), hn::Add(All(query.reach), motion), hn::Mul(half, hn::Sqrt(Dot(across, across))));
-  return Bits(hn::Le(hn::Add(least, nearest), most));
+  F squared = Dot(across, across);
+  if (shell.swings != nullptr) {
+    const Points then = Added(across, Difference(GatherSamples(shell.swings, to), GatherSamples(shell.swings, from)));
+    squared = hn::Max(squared, Dot(then, then));
+  }
+  return Bits(hn::Or(hn::Le(over, hn::Zero(d)), hn::Le(hn::Mul(over, over), squared)));
 }
 
 HWY_ATTR std::size_t NearEdges(const FieldQuery& query, const ShellView& shell, const SampleBounds& bounds,
                                const std::uint32_t* clusters, std::size_t count, float step, FieldHit* hits) {
-  EdgeQueue seen, looked_at, marched;
+  EdgeQueue looked_at, marched;
   std::size_t found = 0;
   const auto march = [&]() HWY_ATTR {
     if (marched.count == 0) return;
@@ -240,32 +233,24 @@ HWY_ATTR std::size_t NearEdges(const FieldQuery& query, const ShellView& shell, 
   const auto look = [&]() HWY_ATTR {
     if (looked_at.count == 0) return;
     unsigned wanted = looked_at.Take();
-    for (wanted &= EdgeBlock(query, shell, looked_at).Look(bounds); wanted != 0; wanted &= wanted - 1) {
+    for (wanted &= EdgeBlock(query, shell, looked_at).Look(shell, bounds); wanted != 0; wanted &= wanted - 1) {
       const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(wanted));
       marched.Add(looked_at.edge[at], looked_at.ends[0][at], looked_at.ends[1][at]);
       if (marched.Full()) march();
     }
   };
-  const auto see = [&]() HWY_ATTR {
-    if (seen.count == 0) return;
-    unsigned wanted = seen.Take();
-    for (wanted &= MayReachFromCentre(query, shell, bounds, seen); wanted != 0; wanted &= wanted - 1) {
-      const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(wanted));
-      looked_at.Add(seen.edge[at], seen.ends[0][at], seen.ends[1][at]);
-      if (looked_at.Full()) look();
-    }
-  };
   for (std::size_t c = 0; c < count; ++c)
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
       const std::int32_t* ends = shell.edge_ends + 2 * kFieldLanes * clusters[c] + lane;
-      unsigned within = MayReach(query, shell, bounds, hn::LoadU(Ints(), ends), hn::LoadU(Ints(), ends + kFieldLanes));
+      unsigned within = MayReach(query, shell, bounds, hn::LoadU(Ints(), ends), hn::LoadU(Ints(), ends + kFieldLanes),
+                                 2.0f * shell.edges.radii[clusters[c]]);
       for (; within != 0; within &= within - 1) {
         const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(within));
-        seen.Add(static_cast<std::int32_t>(clusters[c] * kFieldLanes + lane + at), ends[at], ends[kFieldLanes + at]);
-        if (seen.Full()) see();
+        looked_at.Add(static_cast<std::int32_t>(clusters[c] * kFieldLanes + lane + at), ends[at],
+                      ends[kFieldLanes + at]);
+        if (looked_at.Full()) look();
       }
     }
-  see();
   look();
   march();
   return found;

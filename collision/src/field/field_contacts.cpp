@@ -37,7 +37,10 @@ void set_frame(FieldQuery& query, const Eigen::Matrix3f& R, const Vec3f& p) {
   }
 }
 
-void set_motion(FieldQuery& query, const RigidTransform& X_FS, const RigidTransform& end) {
+// What turns by θ about a point at a distance r strays by r (1 − cos θ/2) from its chord; points are up to |p| from the
+// origin of the field's frame, and as far as their box's corners from their own. |R' − R| = √8 sin θ/2.
+void set_motion(FieldQuery& query, const RigidTransform& X_FS, const RigidTransform& end,
+                const DeformedPointshell& me) {
   const Mat3 turn = to_matrix(end.q) - to_matrix(X_FS.q);
   const Vec3 shift = end.p - X_FS.p;
   for (int i = 0; i < 3; ++i) {
@@ -45,6 +48,10 @@ void set_motion(FieldQuery& query, const RigidTransform& X_FS, const RigidTransf
     query.shift[i] = static_cast<float>(shift[i]);
   }
   query.turning = static_cast<float>(turn.norm());
+  const double squared_sine = std::min(0.125 * turn.squaredNorm(), 1.0);
+  const double farthest = static_cast<double>(me.low().cwiseAbs().cwiseMax(me.high().cwiseAbs()).norm());
+  query.curve =
+      static_cast<float>((farthest + std::max(X_FS.p.norm(), end.p.norm())) * (1.0 - std::sqrt(1.0 - squared_sine)));
 }
 
 void set_fall(FieldQuery& query, const Vec3& fall) {
@@ -75,22 +82,24 @@ void FieldView::place(const DeformedPointshell& me, const DeformedPointshell& fi
   query.field = field.shell().distance();
   query.lattice = field.lattice();
   query.reach = static_cast<float>(reach);
-  query.flex = field.flex();
+  Eigen::Map<Vec3f>(query.low) = field.low(), Eigen::Map<Vec3f>(query.high) = field.high();
   set_frame(query, turn, shift);
-  set_motion(query, X_FS, end);
+  set_motion(query, X_FS, end, me);
   query.swing = me.largest_swing();
   set_fall(query, fall);
 }
 
 bool FieldView::apart() const {
-  const Vec3f centre = placed(0.5f * (mine->low() + mine->high())) - 0.5f * (other->low() + other->high());
-  const Vec3f half = turn.cwiseAbs() * (0.5f * (mine->high() - mine->low())) + 0.5f * (other->high() - other->low());
+  const Vec3f middle = 0.5f * (mine->low() + mine->high()), half_mine = 0.5f * (mine->high() - mine->low());
+  const Vec3f centre = placed(middle) - 0.5f * (other->low() + other->high());
+  const Vec3f half = turn.cwiseAbs() * half_mine + 0.5f * (other->high() - other->low());
   const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> turning(&query.turn[0][0]);
-  const Vec3f middle = 0.5f * (mine->low() + mine->high());
-  const Vec3f moved = (turning * middle + Vec3f(query.shift[0], query.shift[1], query.shift[2])).cwiseAbs();
+  const Vec3f then = centre + turning * middle + Vec3f(query.shift[0], query.shift[1], query.shift[2]);
   const float fall = std::hypot(query.fall[0], query.fall[1], query.fall[2]);
-  const float spread = query.turning * 0.5f * (mine->high() - mine->low()).norm() + query.swing + fall;
-  return (centre.cwiseAbs() - half - moved).maxCoeff() > query.reach + spread;
+  const float spread = query.turning * half_mine.norm() + query.swing + fall + query.curve;
+  // On one side now and then, the same one.
+  const Vec3f beyond = centre.cwiseMin(then).cwiseMax(-centre.cwiseMax(then)) - half;
+  return beyond.maxCoeff() > query.reach + spread;
 }
 
 FoundSide at_vertex(const DeformedPointshell& body, Index v) {
@@ -301,7 +310,7 @@ void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape,
     set_frame(query, Eigen::Matrix3f::Identity(), Vec3f::Zero());
     // In that frame the plane moves the other way.
     const RigidTransform moved = X_BS * (shape_is_a ? motion_.end : motion_.end.inverse());
-    set_motion(query, {}, moved);
+    set_motion(query, {}, moved, *body.shell);
     set_fall(query, X_BS.q * fall_S);
   } else {
     capsule_of(shape, capsule);
@@ -309,7 +318,7 @@ void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape,
     query.field.size[2] = static_cast<float>(capsule.half_length);
     query.field.radius = static_cast<float>(capsule.radius);
     set_frame(query, to_matrix(X_SB.q).cast<float>(), X_SB.p.cast<float>());
-    set_motion(query, X_SB, shape_is_a ? motion_.end : motion_.end.inverse());
+    set_motion(query, X_SB, shape_is_a ? motion_.end : motion_.end.inverse(), *body.shell);
     set_fall(query, fall_S);
   }
   const ShellView shell = body.shell->view();

@@ -35,6 +35,9 @@ HWY_INLINE HWY_ATTR F Dot(const Points& a, const Points& b) {
 HWY_INLINE HWY_ATTR Points Difference(const Points& a, const Points& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
+HWY_INLINE HWY_ATTR Points Added(const Points& a, const Points& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
 HWY_INLINE HWY_ATTR F Mix(F a, F b, F t) { return hn::MulAdd(t, hn::Sub(b, a), a); }
 
 // Of a cluster, from a lane on.
@@ -190,27 +193,37 @@ HWY_INLINE HWY_ATTR Distance DistanceOf(const DistanceView& f, const Points& q) 
   return GridDistance(f, q);
 }
 
+// A point at a time, as a node's xyz lie together: gathers would take each number by itself.
 HWY_INLINE HWY_ATTR Points DisplacementAt(const LatticeView& l, const Points& r) {
   const Floats d;
+  const hn::CappedTag<float, 4> xyz;
   const Cell c = CellOf(l.grid, r);
-  const std::int32_t nx = l.grid.stride[0], ny = l.grid.stride[1];
-  const auto node = [&](std::int32_t offset) HWY_ATTR {
-    const I at = hn::GatherIndex(Ints(), l.place + offset, c.node);
-    return Points{hn::GatherIndex(d, l.coordinates, at), hn::GatherIndex(d, l.coordinates + 1, at),
-                  hn::GatherIndex(d, l.coordinates + 2, at)};
-  };
-  const auto mix = [](const Points& a, const Points& b, F t) HWY_ATTR {
-    return Points{Mix(a.x, b.x, t), Mix(a.y, b.y, t), Mix(a.z, b.z, t)};
-  };
-  const Points v00 = mix(node(0), node(1), c.z), v01 = mix(node(ny), node(ny + 1), c.z);
-  const Points v0 = mix(v00, v01, c.y);
-  const Points v10 = mix(node(nx), node(nx + 1), c.z), v11 = mix(node(nx + ny), node(nx + ny + 1), c.z);
-  return mix(v0, mix(v10, v11, c.y), c.x);
+  HWY_ALIGN std::int32_t node[kLanes];
+  HWY_ALIGN float part[3][kLanes], all[4 * kLanes];
+  hn::Store(c.node, Ints(), node);
+  hn::Store(c.x, d, part[0]), hn::Store(c.y, d, part[1]), hn::Store(c.z, d, part[2]);
+  const std::int32_t nx = 3 * l.grid.stride[0], ny = 3 * l.grid.stride[1];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    for (std::size_t axis = 0; axis < 3; axis += hn::MaxLanes(xyz)) {
+      const float* first = l.nodes + 3 * node[lane] + axis;
+      const auto mix = [&](hn::Vec<decltype(xyz)> a, hn::Vec<decltype(xyz)> b, std::size_t along)
+                           HWY_ATTR { return hn::MulAdd(hn::Set(xyz, part[along][lane]), hn::Sub(b, a), a); };
+      const auto along_z = [&](std::int32_t offset) HWY_ATTR {
+        return mix(hn::LoadU(xyz, first + offset), hn::LoadU(xyz, first + offset + 3), 2);
+      };
+      const auto low = mix(along_z(0), along_z(ny), 1), high = mix(along_z(nx), along_z(nx + ny), 1);
+      hn::StoreU(mix(low, high, 0), xyz, all + 4 * lane + axis);
+    }
+  }
+  Points u;
+  F none;
+  hn::LoadInterleaved4(d, all, u.x, u.y, u.z, none);
+  return u;
 }
 
 HWY_INLINE HWY_ATTR Points CarriedBack(const LatticeView& l, const Points& q) {
   Points r = q;
-  if (l.place == nullptr) return r;
+  if (l.nodes == nullptr) return r;
   for (int step = 0; step < l.steps; ++step) r = Difference(q, DisplacementAt(l, r));
   return r;
 }
@@ -250,8 +263,25 @@ HWY_INLINE HWY_ATTR F Closing(const FieldQuery& q, const Points& slope, const Po
   return hn::Max(hn::Div(hn::Sub(falls, Dot(slope, moved)), steepness), hn::Zero(d));
 }
 
-HWY_INLINE HWY_ATTR F FallLength(const FieldQuery& q) {
-  return All(std::sqrt(q.fall[0] * q.fall[0] + q.fall[1] * q.fall[1] + q.fall[2] * q.fall[2]));
+// How far points may come to lie from their straight ways.
+HWY_INLINE HWY_ATTR F Strays(const FieldQuery& q) {
+  return All(q.curve + std::sqrt(q.fall[0] * q.fall[0] + q.fall[1] * q.fall[1] + q.fall[2] * q.fall[2]));
+}
+
+// How far a point that goes straight stays beyond one of the sides of the surface's box; negative: of none.
+HWY_INLINE HWY_ATTR F BeyondBox(const FieldQuery& q, const Points& start, const Points& way) {
+  const auto beyond = [&](int axis, F from, F along) HWY_ATTR {
+    const F to = hn::Add(from, along);
+    return hn::Max(hn::Sub(hn::Min(from, to), All(q.high[axis])), hn::Sub(All(q.low[axis]), hn::Max(from, to)));
+  };
+  return hn::Max(hn::Max(beyond(0, start.x, way.x), beyond(1, start.y, way.y)), beyond(2, start.z, way.z));
+}
+
+// How far a point that is at a distance of the surface, and goes straight so far, stays clear of it.
+HWY_INLINE HWY_ATTR F ClearOnTheWay(const FieldQuery& q, F distance, const Points& rest, const Points& way) {
+  const F then = DistanceOf(q.field, Added(rest, way)).value;
+  const F both = hn::Sub(hn::Add(distance, then), hn::Sqrt(Dot(way, way)));
+  return hn::Sub(hn::Min(distance, hn::Mul(All(0.5f), both)), Strays(q));
 }
 
 }  // namespace limber::internal::HWY_NAMESPACE

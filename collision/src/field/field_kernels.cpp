@@ -21,30 +21,33 @@ namespace limber::internal::HWY_NAMESPACE {
 HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& clusters, std::uint32_t* found,
                                   const SampleBounds& bounds) {
   const Floats d;
-  const F others = hn::Add(All(query.flex + query.swing), FallLength(query));
+  const F reach = All(query.reach), others = hn::Add(All(query.swing), Strays(query));
   std::size_t count = 0;
   const F unknown = All(std::numeric_limits<float>::quiet_NaN());
-  HWY_ALIGN float distance[kLanes], motion[kLanes];
+  HWY_ALIGN float clears[kLanes];
   for (std::size_t g = 0; g < clusters.groups; ++g)
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
       const Points centre = LoadCluster(clusters.centres + g * kClusterFloats, lane), q = Placed(query, centre),
-                   moved = Carried(query, centre);
+                   way = Carried(query, centre);
       const F radius = hn::LoadU(d, clusters.radii + g * kFieldLanes + lane);
-      const F beyond = hn::Sub(DistanceOf(query.field, q).value, radius);
-      const F comes = hn::MulAdd(All(query.turning), radius, hn::Add(hn::Sqrt(Dot(moved, moved)), others));
-      unsigned near = Bits(hn::And(hn::Ge(radius, hn::Zero(d)), hn::Le(beyond, hn::Add(comes, All(query.reach)))));
-      for (unsigned left = near; left != 0; left &= left - 1) {
+      const auto used = hn::Ge(radius, hn::Zero(d));
+      const F spread = hn::MulAdd(All(1.0f + query.turning), radius, others);
+      F clear = hn::Sub(BeyondBox(query, q, way), spread);
+      if (!hn::AllFalse(d, hn::And(used, hn::Le(clear, reach)))) {
+        const Points r = CarriedBack(query.lattice, q);
+        clear = hn::Max(clear, hn::Sub(ClearOnTheWay(query, DistanceOf(query.field, r).value, r, way), spread));
+      }
+      for (unsigned left = Bits(hn::And(used, hn::Le(clear, reach))); left != 0; left &= left - 1) {
         const auto at = static_cast<unsigned>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
         found[count++] = static_cast<std::uint32_t>(g * kFieldLanes + lane + at);
       }
       if (bounds.distance == nullptr) continue;
-      hn::Store(hn::Max(hn::Sub(beyond, All(query.flex)), hn::Zero(d)), d, distance);
-      hn::Store(comes, d, motion);
+      hn::Store(clear, d, clears);
       for (std::size_t c = 0; c < kLanes; ++c)
         for (std::size_t s = 0; s < kFieldLanes; s += kLanes) {
           const std::size_t first = (g * kFieldLanes + lane + c) * kFieldLanes + s;
-          hn::StoreU(All(distance[c]), d, bounds.distance + first);
-          hn::StoreU(All(motion[c]), d, bounds.motion + first);
+          hn::StoreU(All(clears[c]), d, bounds.distance + first);
+          hn::StoreU(All(clears[c]), d, bounds.clear + first);
           StoreCluster({unknown, unknown, unknown}, bounds.slope + kClusterFloats / kFieldLanes * (first - s), s);
         }
     }
@@ -53,37 +56,36 @@ HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& cl
 
 HWY_ATTR std::size_t NearSamples(const FieldQuery& query, const ShellView& shell, const std::uint32_t* clusters,
                                  std::size_t count, FieldHit* hits, const SampleBounds& bounds) {
-  const bool carried = query.lattice.place != nullptr && query.lattice.steps > 0;
   const Floats d;
+  const F reach = All(query.reach);
   std::size_t found = 0;
   Lanes lanes;
   for (std::size_t c = 0; c < count; ++c) {
     const std::size_t cluster = clusters[c];
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
       const Points x = LoadCluster(shell.coordinates + cluster * kClusterFloats, lane), q = Placed(query, x);
-      Points moved = Carried(query, x);
+      Points way = Carried(query, x);
       if (shell.swings != nullptr)
-        moved = Rotated(query.R, LoadCluster(shell.swings + cluster * kClusterFloats, lane), moved);
-      const F motion = hn::Add(hn::Sqrt(Dot(moved, moved)), FallLength(query));
-      const auto keep_bounds = [&](F least, const Points& slope) HWY_ATTR {
+        way = Rotated(query.R, LoadCluster(shell.swings + cluster * kClusterFloats, lane), way);
+      const auto keep_bounds = [&](F least, F clear, const Points& slope) HWY_ATTR {
         if (bounds.distance == nullptr) return;
         hn::StoreU(least, d, bounds.distance + cluster * kFieldLanes + lane);
-        hn::StoreU(motion, d, bounds.motion + cluster * kFieldLanes + lane);
+        hn::StoreU(hn::IfThenElse(hn::Lt(least, hn::Zero(d)), hn::Neg(least), clear), d,
+                   bounds.clear + cluster * kFieldLanes + lane);
         StoreCluster(slope, bounds.slope + cluster * kClusterFloats, lane);
       };
-      // What is far off as seen from the rest shape is not worth the way back into it.
-      if (carried) {
-        const Distance at = DistanceOf(query.field, q);
-        const F least = hn::Sub(at.value, All(query.flex));
-        if (hn::AllFalse(d, hn::Le(least, hn::Add(motion, All(query.reach))))) {
-          keep_bounds(least, at.slope);
-          continue;
-        }
+      const F beyond = hn::Sub(BeyondBox(query, q, way), Strays(query));
+      if (hn::AllFalse(d, hn::Le(beyond, reach))) {
+        const F unknown = All(std::numeric_limits<float>::quiet_NaN());
+        keep_bounds(beyond, beyond, {unknown, unknown, unknown});
+        continue;
       }
       const Points r = CarriedBack(query.lattice, q);
       const Distance distance = DistanceOf(query.field, r);
-      keep_bounds(distance.value, distance.slope);
-      unsigned within = Bits(hn::Le(distance.value, hn::Add(All(query.reach), Closing(query, distance.slope, moved))));
+      const F clear = hn::Max(beyond, ClearOnTheWay(query, distance.value, r, way));
+      keep_bounds(distance.value, clear, distance.slope);
+      unsigned within = Bits(
+          hn::And(hn::Le(distance.value, hn::Add(reach, Closing(query, distance.slope, way))), hn::Le(clear, reach)));
       if (within == 0) continue;
       lanes.Store(q, r, distance);
       for (; within != 0; within &= within - 1) {

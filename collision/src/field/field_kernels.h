@@ -42,9 +42,8 @@ struct DistanceView {
 /// Displacements of a deformed body about its surface, trilinear between nodes.
 struct LatticeView {
   GridView grid{};
-  const std::int32_t* place = nullptr;  ///< per node, where its xyz stand in `coordinates`; null: nothing is displaced
-  const float* coordinates = nullptr;
-  int steps = 0;  ///< of r ← q − u(r), which carries a point back into the rest shape
+  const float* nodes = nullptr;  ///< xyz of each, and one number more; null: nothing is displaced
+  int steps = 0;                 ///< of r ← q − u(r), which carries a point back into the rest shape
 };
 
 /// What distances are asked of: a field and how the points lie in its frame, q = R x + p.
@@ -54,12 +53,14 @@ struct FieldQuery {
   float R[3][3] = {};  ///< rows
   float p[3] = {};
   float reach = 0.0f;  ///< m: distances up to here count, and farther ones as the points' own motion closes them along
-                       ///< the slope
-  float flex = 0.0f;   ///< m: no point of the field's body is displaced farther
+                       ///< the slope, if it may bring them within reach
+  /// Encloses the surface, in the field's frame, m.
+  float low[3] = {-3e38f, -3e38f, -3e38f}, high[3] = {3e38f, 3e38f, 3e38f};
   /// How a point is expected to move in the field's frame until the step's end: turn x + shift + R u, u its swing.
   float turn[3][3] = {};
   float shift[3] = {};
   float turning = 0.0f;  ///< |turn|
+  float curve = 0.0f;    ///< m: what turns strays no farther from the straight way
   float swing = 0.0f;    ///< m: no |u| is larger
   float fall[3] = {};    ///< or so much farther or less, in the field's frame
 };
@@ -83,9 +84,12 @@ struct ShellView {
 
 /// Per sample of one surface, with room for whole groups of clusters. Where its cluster is far off, bounds take the
 /// place of its own numbers, and the slope is not a number.
+///
+/// A point that goes straight from where the distance is d to where it is d', a way of m, stays (d + d' − m)/2 clear of
+/// the surface at least, as distances change by no more than the way.
 struct SampleBounds {
   float* distance = nullptr;  ///< m: from the other surface, negative inside; or less than that, outside
-  float* motion = nullptr;    ///< m: it is expected to move at most so far
+  float* clear = nullptr;     ///< m: outside, it stays so far from the surface at least; inside, it is so far from it
   float* slope = nullptr;     ///< of the distance, by cluster: x[8] y[8] z[8], in the field's frame
 };
 

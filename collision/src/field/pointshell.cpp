@@ -252,6 +252,8 @@ DeformedPointshell::DeformedPointshell(std::shared_ptr<const Pointshell> shell) 
     coordinates_ = own_.data();
     std::copy_n(s.rest_.data(), s.rows_, own_.data());
     std::copy_n(s.radius_.data(), s.radius_.size(), radii_.data());
+    space_ = AlignedArray<float>(3 * s.lattice_place_.size() + 1);
+    std::fill_n(space_.data(), space_.size(), 0.0f);
   }
   find_extent();
 }
@@ -280,7 +282,7 @@ LatticeView DeformedPointshell::lattice() const {
   const Pointshell& s = *shell_;
   if (!carries_back_) return {};
   const bool once = static_cast<double>(flex_) <= collision_tuning().field.carried_once * s.longest_side_;
-  return {s.lattice_->grid(), s.lattice_place_.data(), coordinates_, once ? 1 : 2};
+  return {s.lattice_->grid(), space_.data(), once ? 1 : 2};
 }
 
 // A vertex stays within its cluster's ball, and within flex of where it is at rest.
@@ -298,6 +300,8 @@ void DeformedPointshell::find_extent() {
 
 // @pre carries_back_
 void DeformedPointshell::find_flex() {
+  float* u = space_.data();
+  for (const std::int32_t at : shell_->lattice_place_) u = std::copy_n(coordinates_ + at, 3, u);
   float largest[3];
   largest_magnitudes(coordinates_ + shell_->lattice_rows_, static_cast<std::size_t>(shell_->lattice_->nodes()),
                      largest);

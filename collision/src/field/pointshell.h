@@ -133,6 +133,7 @@ class DeformedPointshell {
 
   std::shared_ptr<const Pointshell> shell_;
   AlignedArray<float> own_, swings_, radii_;  ///< none of a rigid one
+  AlignedArray<float> space_;                 ///< displacements of all nodes of the lattice's grid, see LatticeView
   AlignedArray<float> amplitudes_;            ///< then their magnitudes, then how they are expected to change
   const float* coordinates_ = nullptr;
   Vec3f low_ = Vec3f::Zero(), high_ = Vec3f::Zero();
