@@ -21,6 +21,16 @@ float shortest_edge_of(const DeformedPointshell& body, Index t) {
   return std::sqrt(std::min({(x[1] - x[0]).squaredNorm(), (x[2] - x[1]).squaredNorm(), (x[0] - x[2]).squaredNorm()}));
 }
 
+// Of a foot from the nearest side of its face.
+float from_rim(const DeformedPointshell& body, const SurfaceFoothold& foot) {
+  const TrianglePointsf x = corners_of(body, foot.triangle);
+  const float twice_area = (x[1] - x[0]).cross(x[2] - x[0]).norm();
+  float least = std::numeric_limits<float>::infinity();
+  for (std::size_t c = 0; c < 3; ++c)
+    least = std::min(least, foot.weight[c] * twice_area / (x[(c + 2) % 3] - x[(c + 1) % 3]).norm());
+  return least;
+}
+
 // The faces at the corners of a face, some more than once.
 template <class Visit>
 void for_faces_around(const CollisionSurface& surface, Index t, const Visit& visit) {
@@ -81,7 +91,7 @@ bool unhindered(const FieldView& view, SampleFoot& sample, float passed) {
   const Vec3f out = sample.at - sample.foot.point;
   Vec3f best = sample.normal;
   float end = sample.gap + best.dot(motion);
-  if (!(end < 0.0f)) return true;
+  if (!(end < 0.0f) || from_rim(other, sample.foot) > passed) return true;
   const auto leaning = static_cast<float>(collision_tuning().narrow.leaning);
   const float noise = kNoise * (out.norm() + motion.norm());  // faces of one plane differ by it
   const auto try_normal = [&](const Vec3f& n) {

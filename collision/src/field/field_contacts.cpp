@@ -195,7 +195,7 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, motion_.fall,
                  comes_near(0) + slack * a.shell->shell().cell());
   if (view_[1].apart()) return;
-  edges_.begin(view_[0], view_[1], static_cast<float>(motion_.passed));
+  edges_.begin(view_[0], view_[1], static_cast<float>(reach_), static_cast<float>(motion_.passed));
   SampleBounds bounds[2];
   for (int of = 0; of < 2; ++of) {
     const ClusterView samples = view_[of].mine->view().samples;

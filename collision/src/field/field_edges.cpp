@@ -14,8 +14,8 @@ int corner_of(const CollisionSurface& surface, Index t, Index e) {
 
 }  // namespace
 
-void FieldEdges::begin(const FieldView& a_in_b, const FieldView& b_in_a, float passed) {
-  view_[0] = a_in_b, view_[1] = b_in_a, passed_ = passed;
+void FieldEdges::begin(const FieldView& a_in_b, const FieldView& b_in_a, float reach, float passed) {
+  view_[0] = a_in_b, view_[1] = b_in_a, reach_ = reach, passed_ = passed;
   piercings_.clear(), contacts_.clear();
   ++generation_;
   for (int of = 0; of < 2; ++of) {
@@ -142,12 +142,14 @@ void FieldEdges::add_separated(int of, Index edge, Index other) {
   if (!view_[of].other->shell().sticks_out(other)) return;
   if (!nearest_of_edges(of == 0 ? edge : other, of == 0 ? other : edge, pair)) return;
   if (touches(pair)) turn(pair, 1.0f);
+  const Vec3f motion = expected_motion(pair);
+  if (!comes_near(pair, motion)) return;
   if (!in_normal_cone(1, pair.f, pair.direction) || !in_normal_cone(0, pair.e, -pair.direction)) return;
-  if (unhindered(pair)) add(pair, pair.direction);
+  if (unhindered(pair, motion)) add(pair, pair.direction);
 }
 
-// See unhindered() of a sample.
-bool FieldEdges::unhindered(EdgePair& pair) const {
+// How the point of a is expected to move against that of b.
+Vec3f FieldEdges::expected_motion(const EdgePair& pair) const {
   const auto swing = [&](int of, Index edge, float along) {
     const auto& ends = view_[of].mine->shell().surface().edge(edge).vertices;
     const Vec3f from = view_[of].mine->swing(ends[0]);
@@ -158,7 +160,21 @@ bool FieldEdges::unhindered(EdgePair& pair) const {
   const Vec3f of_b = turning * view.turned_back(pair.on_f - view.shift) +
                      Vec3f(view.query.shift[0], view.query.shift[1], view.query.shift[2]) +
                      view.turn * swing(1, pair.f, pair.t);
-  const Vec3f motion = swing(0, pair.e, pair.s) - of_b, apart = pair.on_e - pair.on_f;
+  return swing(0, pair.e, pair.s) - of_b;
+}
+
+// Whether a gap, but for round-off, is one that settle() of FieldContacts keeps.
+bool FieldEdges::comes_near(const EdgePair& pair, const Vec3f& motion) const {
+  const auto& fall = view_[1].query.fall;
+  const float closing = std::abs(pair.direction.dot(Vec3f(fall[0], fall[1], fall[2]))) - pair.direction.dot(motion);
+  const float round_off = kNoise * (static_cast<float>(view_[0].mine->shell().longest_side()) + motion.norm());
+  return pair.distance <= reach_ + std::max(closing, 0.0f) + round_off;
+}
+
+// See unhindered() of a sample.
+bool FieldEdges::unhindered(EdgePair& pair, const Vec3f& motion) const {
+  const FieldView& view = view_[1];
+  const Vec3f apart = pair.on_e - pair.on_f;
   const Vec3f direction = pair.direction;
   const float noise = kNoise * (apart.norm() + motion.norm());
   float end = direction.dot(apart + motion);

@@ -11,8 +11,9 @@ namespace limber::internal {
 /// See field_contacts.h. Everything in the frame of a.
 class FieldEdges {
  public:
-  /// @param passed see unhindered()
-  void begin(const FieldView& a_in_b, const FieldView& b_in_a, float passed);
+  /// @param reach gaps up to here are wanted, and those that the expected motion brings there @param passed see
+  /// unhindered()
+  void begin(const FieldView& a_in_b, const FieldView& b_in_a, float reach, float passed);
   /// Edges of a vertex on those that its foot lies on: where they cross, or come nearest, is next to the vertex.
   void find_at_end(int of, const SampleFoot& sample);
   /// An inside vertex leaves along a direction, out of b into a.
@@ -50,7 +51,9 @@ class FieldEdges {
   void add_separated(int of, Index edge, Index other);
   void add_separated_of_face(int of, Index edge, Index face);
   bool goes_through_face(int of, Index edge, Index near, const Vec3f& from, const Vec3f& to);
-  bool unhindered(EdgePair& pair) const;
+  Vec3f expected_motion(const EdgePair& pair) const;
+  bool comes_near(const EdgePair& pair, const Vec3f& motion) const;
+  bool unhindered(EdgePair& pair, const Vec3f& motion) const;
   void find_loops();
   void cross_loop(std::size_t first, std::size_t end);
   void find_crossings(std::size_t first, std::size_t end);
@@ -61,7 +64,7 @@ class FieldEdges {
   FoundSide on_edge(int of, Index edge, float along, const Vec3f& point) const;
 
   FieldView view_[2];
-  float passed_ = 0.0f;
+  float reach_ = 0.0f, passed_ = 0.0f;
   std::vector<FieldHit> hits_;
   std::vector<Piercing> piercings_;
   std::vector<Crossed> crossed_;

@@ -111,6 +111,11 @@ void Pointshell::order_samples() {
   for (std::size_t s = 0; s < sample_vertex_.size(); ++s)
     slot_[static_cast<std::size_t>(sample_vertex_[s])] =
         static_cast<std::int32_t>(s / kLanes * kClusterFloats + s % kLanes);
+  for (Index t = 0; t < surface_->triangles(); ++t) {
+    const Triangle& v = surface_->triangle(t);
+    corner_slots_.push_back({slot_[static_cast<std::size_t>(v[0])], slot_[static_cast<std::size_t>(v[1])],
+                             slot_[static_cast<std::size_t>(v[2])]});
+  }
   sample_vertex_.resize(rounded_up(sample_vertex_.size(), kLanes), sample_vertex_.back());
 }
 
@@ -236,8 +241,8 @@ void Pointshell::make_rows() {
 
 std::size_t Pointshell::bytes() const {
   const auto of = [](const auto& v) { return v.size() * sizeof(v[0]); };
-  return of(rest_) + of(U_) + of(radius_) + of(spread_) + of(sample_vertex_) + of(slot_) + of(edges_) + of(edge_ends_) +
-         of(lattice_place_) + (grid_ ? grid_->bytes() : 0);
+  return of(rest_) + of(U_) + of(radius_) + of(spread_) + of(sample_vertex_) + of(slot_) + of(corner_slots_) +
+         of(edges_) + of(edge_ends_) + of(lattice_place_) + (grid_ ? grid_->bytes() : 0);
 }
 
 // -- In one state -----------------------------------------------------------------------------------------------------

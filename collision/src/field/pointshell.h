@@ -7,6 +7,7 @@
 //   DeformedPointshell  one body of it in one state
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -83,13 +84,14 @@ class Pointshell {
 
   Clusters sample_clusters_{}, edge_clusters_{};
   std::size_t lattice_rows_ = 0, rows_ = 0;
-  AlignedArray<float> none_;             ///< zeros, as many as samples have rows, up to a whole tile
-  std::vector<Index> sample_vertex_;     ///< by cluster; the last ones may be repeated
-  std::vector<std::int32_t> slot_;       ///< of vertices: where x stands in the coordinates; −1: of no triangle
-  std::vector<bool> sticks_out_;         ///< of edges of the surface
-  std::vector<Index> edges_;             ///< by cluster; the last ones may be repeated
-  std::vector<std::int32_t> edge_ends_;  ///< see ShellView
-  AlignedArray<float> rest_, U_;         ///< U in tiles, see multiply_rows()
+  AlignedArray<float> none_;          ///< zeros, as many as samples have rows, up to a whole tile
+  std::vector<Index> sample_vertex_;  ///< by cluster; the last ones may be repeated
+  std::vector<std::int32_t> slot_;    ///< of vertices: where x stands in the coordinates; −1: of no triangle
+  std::vector<std::array<std::int32_t, 3>> corner_slots_;  ///< of triangles: those of its vertices
+  std::vector<bool> sticks_out_;                           ///< of edges of the surface
+  std::vector<Index> edges_;                               ///< by cluster; the last ones may be repeated
+  std::vector<std::int32_t> edge_ends_;                    ///< see ShellView
+  AlignedArray<float> rest_, U_;                           ///< U in tiles, see multiply_rows()
   /// Per cluster of samples and then of edges: r + Σ |z_i| s_i, how far from its centre it gets.
   AlignedArray<float> radius_, spread_;
   std::vector<float> largest_shape_;  ///< per mode, of any vertex
@@ -105,9 +107,10 @@ class DeformedPointshell {
   /// @pre as many as the shell has modes
   void set_amplitudes(std::span<const double> z, std::span<const double> end = {});
 
-  Vec3f vertex(Index v) const {
-    const float* x = coordinates_ + shell_->slot_[static_cast<std::size_t>(v)];
-    return {x[0], x[kFieldLanes], x[2 * kFieldLanes]};
+  Vec3f vertex(Index v) const { return at(shell_->slot_[static_cast<std::size_t>(v)]); }
+  std::array<Vec3f, 3> corners(Index triangle) const {
+    const auto& slots = shell_->corner_slots_[static_cast<std::size_t>(triangle)];
+    return {at(slots[0]), at(slots[1]), at(slots[2])};
   }
   /// How a vertex is expected to move as the modes take it, body frame.
   Vec3f swing(Index v) const {
@@ -130,6 +133,10 @@ class DeformedPointshell {
   static void deform_together(std::span<DeformedPointshell* const> bodies);
   void find_extent();
   void find_flex();
+  Vec3f at(std::int32_t slot) const {
+    const float* x = coordinates_ + slot;
+    return {x[0], x[kFieldLanes], x[2 * kFieldLanes]};
+  }
 
   std::shared_ptr<const Pointshell> shell_;
   AlignedArray<float> own_, swings_, radii_;  ///< none of a rigid one

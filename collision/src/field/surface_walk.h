@@ -25,10 +25,7 @@ struct SurfaceFoothold {
 
 using TrianglePointsf = std::array<Vec3f, 3>;
 
-inline TrianglePointsf corners_of(const DeformedPointshell& body, Index t) {
-  const Triangle& v = body.shell().surface().triangle(t);
-  return {body.vertex(v[0]), body.vertex(v[1]), body.vertex(v[2])};
-}
+inline TrianglePointsf corners_of(const DeformedPointshell& body, Index t) { return body.corners(t); }
 
 /// Unit; zero of a triangle without area.
 Vec3f face_normal(const DeformedPointshell& body, Index t);
