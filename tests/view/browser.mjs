@@ -33,8 +33,10 @@ browser.setDefaultTimeout(patience);
 
 let probing = false;  // what is refused then is told on the console, as it should be
 
+const plays = (page) => page.evaluate(() => globalThis.limber !== undefined || document.getElementById('message').textContent !== '');
+
 /** Opens a page and waits until it plays or says why not. */
-export async function open(path) {
+export async function open(path, holds = plays) {
   const page = await browser.newPage(), url = pathToFileURL(resolve(path)).href;
   page.on('console', (message) => { if (message.type() === 'error' && !probing) wrong.push(`console: ${message.text()}`); });
   page.on('pageerror', (error) => wrong.push(`an error in the page: ${error.message}`));
@@ -42,7 +44,7 @@ export async function open(path) {
     if (request.url() !== url && !/^(data|blob):/.test(request.url())) wrong.push(`a request: ${request.url().slice(0, 200)}`);
   });
   await page.goto(url);
-  await until(() => page.evaluate(() => globalThis.limber !== undefined || document.getElementById('message').textContent !== ''));
+  await until(() => holds(page));
   return page;
 }
 

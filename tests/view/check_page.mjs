@@ -190,6 +190,92 @@ async function drawsARay(page) {
   check(!(await seen()).visible, 'another tool takes it away');
 }
 
+/** A pointer over a body shows that a press would take hold of it. */
+async function showsWhatCanBeHeld(page) {
+  await fromTheStart(page);
+  const at = await onScreen(page, 0), cursor = () => page.evaluate(() => globalThis.limber.stage.renderer.domElement.style.cursor);
+  await page.mouse.move(...at);
+  check(await until(async () => (await cursor()) === 'grab'), 'a pointer over a body is told');
+  await page.mouse.down();
+  check((await cursor()) === 'grabbing', 'so is a body that is held');
+  await page.mouse.up();
+  await page.mouse.move(3, 3);
+  check(await until(async () => (await cursor()) === ''), 'nothing is told beside it');
+}
+
+/** The ground is seen from above only. */
+async function looksThroughTheGround(page) {
+  const seen = await page.evaluate(() => {
+    const { stage } = globalThis.limber, up = stage.camera.up.clone(), along = up.clone().negate();
+    const grounds = globalThis.limber.engine.scene.statics.flatMap(({ ground }, i) => (ground ? [stage.still.children[i]] : []));
+    return grounds.map((mesh) => {
+      const meets = (from, way) => (stage.caster.set(from, way), stage.caster.intersectObject(mesh).length > 0);
+      const beside = mesh.geometry.attributes.position, middle = up.clone().set(0.1, 0.2, 0), height = beside.getZ(0);
+      return { above: meets(middle.clone().setZ(height + 1), along), below: meets(middle.clone().setZ(height - 1), up) };
+    });
+  });
+  check(seen.length > 0 && seen.every(({ above, below }) => above && !below), `the ground hides nothing from below: ${JSON.stringify(seen)}`);
+}
+
+/** The camera goes with a body, and comes back. */
+async function follows(page) {
+  await fromTheStart(page);
+  const view = () => page.evaluate(() => globalThis.limber.stage.controls.target.toArray());
+  await page.locator('#panel button:has-text("See all")').click();
+  const first = await view();
+  await page.locator('#panel button:has-text("Follow")').click();
+  await page.mouse.click(...(await onScreen(page, 0)));
+  const from = await place(page, 0);
+  await steps(page, 15);
+  const to = await place(page, 0), seen = await view();
+  check(distance(from, to) > 0, 'the body moves');
+  check(distance(seen.map((x, i) => x - first[i]), to.map((x, i) => x - from[i])) < 1e-5, 'the view goes as far as the body');
+  await fromTheStart(page);
+  await page.keyboard.press('Home');
+  check(distance(await view(), first) < 1e-5, 'and sees all again');
+  await page.locator('#panel button:has-text("Drag")').click();
+}
+
+/** On a phone: folded sheets below the picture, controls for fingers, nothing cut off. */
+async function fitsAPhone(page) {
+  const size = page.viewportSize(), folded = picture?.replace('.png', '.phone.png'), unfolded = picture?.replace('.png', '.phone_controls.png');
+  await fromTheStart(page);
+  await page.setViewportSize({ width: 400, height: 800 });
+  await page.keyboard.press('Home');
+  const look = () => page.evaluate(() => {
+    const panel = document.getElementById('panel'), seen = (x) => x.getClientRects().length > 0;
+    const all = [...panel.querySelectorAll('*')].filter(seen), box = panel.getBoundingClientRect();
+    const small = all.filter((x) => x.tagName === 'BUTTON').map((x) => [x.textContent, x.getBoundingClientRect()])
+      .filter(([, { width, height }]) => width < 44 || height < 44).map(([text]) => text);
+    const cut = all.filter((x) => x.getBoundingClientRect().right > innerWidth + 0.5 || x.scrollWidth > x.clientWidth + 1 && x.clientWidth > 0)
+      .map((x) => `${x.tagName} ${x.textContent.slice(0, 20)}`);
+    return { height: box.height, small, cut };
+  });
+  const closed = await look();
+  check(closed.height < 80, `the panel is folded, ${closed.height} pixels high`);
+  check((await onScreen(page, 0)) !== null, 'a body is seen on a phone');
+  if (folded) await page.screenshot({ path: folded });
+  for (const title of ['Details', 'Controls']) {
+    await page.locator(`#panel nav button:has-text("${title}")`).click();
+    const { height, small, cut } = await look();
+    check(height > closed.height && height < 0.6 * 800, `${title} unfolds, ${height} pixels high`);
+    check(small.length === 0, `buttons are of 44 pixels: ${small}`);
+    check(cut.length === 0, `nothing is cut off: ${cut}`);
+    check((await page.locator('#panel .sheet:visible').count()) === 1, 'one sheet at a time');
+  }
+  if (unfolded) await page.screenshot({ path: unfolded });
+  await page.setViewportSize(size);
+}
+
+/** A download that broke off says so. */
+async function tellsOfABrokenDownload() {
+  const text = readFileSync(file, 'utf8'), half = join(folder, 'half.html');
+  writeFileSync(half, text.slice(0, text.length / 2));
+  const page = await open(half, (half) => half.locator('#loading').isVisible());
+  check((await page.locator('#loading').textContent()).includes('not complete'), 'half a page says that it is not complete');
+  await page.close();
+}
+
 async function tellsOfDamage() {
   const text = readFileSync(file, 'utf8'), begin = text.indexOf('<script type="application/json" id="files">');
   const asset = text.indexOf('"base64":"', begin) + 10;
@@ -237,6 +323,8 @@ async function tellsTheStages(page) {
   check(stages.every((x) => x >= 0), `no stage takes less than nothing: ${told}`);
   check(sum > 0.3 * passed && sum < 1.01 * passed, `stages make up a step, but for what the page itself does in it: ${told}`);
   check((await page.evaluate(() => document.getElementById('panel').textContent)).includes('joints solved'), 'stages are named');
+  const [all, ...parts] = await page.evaluate(() => globalThis.limber.panel.time.rows.at(-1));
+  check(all > 0 && Math.abs(all - parts.reduce((a, b) => a + b, 0)) < 1e-9 * all, `parts of the chart sum to the step: ${parts} to ${all}`);
 }
 
 await run('check_page', file, async () => {
@@ -256,8 +344,13 @@ await run('check_page', file, async () => {
     await drawsSensors(page);
     await drawsARay(page);
     await showsWhatTheEngineHas(page);
+    await showsWhatCanBeHeld(page);
+    await looksThroughTheGround(page);
+    await follows(page);
+    await fitsAPhone(page);
     check((await page.evaluate(() => document.querySelectorAll('img, iframe, object, embed').length)) === 0, 'no text has become markup');
   }
   await page.close();
   await tellsOfDamage();
+  await tellsOfABrokenDownload();
 });

@@ -2,6 +2,7 @@
 import { element } from './dom.js';
 
 const LENGTH = 240;
+const short = (x) => String(Number(x.toPrecision(3)));
 
 export class Chart {
   /** @param series [[name, colour]] */
@@ -31,6 +32,10 @@ export class Chart {
     let low = 0, high = 1e-12;
     for (const row of this.rows) for (const x of row) low = Math.min(low, x), high = Math.max(high, x);
     const y = (x) => height - 4 - ((x - low) / (high - low)) * (height - 8);
+    c.fillStyle = '#5d6778';
+    c.font = '20px system-ui, sans-serif';
+    c.fillText(short(high), 4, 20);
+    c.fillText(short(low), 4, height - 4);
     this.series.forEach(([, colour], s) => {
       c.strokeStyle = colour;
       c.lineWidth = 2.5;
@@ -39,6 +44,6 @@ export class Chart {
       c.stroke();
     });
     const last = this.rows[this.rows.length - 1];
-    this.caption.textContent = `${this.title}: ${this.series.map(([name], s) => `${name} ${last[s].toPrecision(3)}`).join(', ')} ${this.unit}`;
+    this.caption.textContent = `${this.title}: ${this.series.map(([name], s) => `${name} ${short(last[s])}`).join(', ')} ${this.unit}`;
   }
 }

@@ -45,6 +45,38 @@ export function download(content, type, name) {
   setTimeout(() => URL.revokeObjectURL(address), 10000);
 }
 
+/** Below this width the panel lies at the foot of the page. style.css has the same. */
+export const NARROW = '(max-width: 700px)';
+
+/** The panel: a bar of buttons that fold and unfold its sheets. All are open beside a wide picture, one at most below a narrow one. */
+export class Sheets {
+  /** @param changed is called after the panel took another size */
+  constructor(host, titles, changed) {
+    this.host = host;
+    this.changed = changed;
+    this.narrow = matchMedia(NARROW);
+    this.sheets = titles.map(() => element('div', { className: 'sheet' }));
+    this.buttons = titles.map((title, i) => button(title, () => this.open(this.sheets.map(({ hidden }, j) =>
+      (i === j ? hidden : !hidden && !this.narrow.matches)))));
+    host.replaceChildren(element('nav', { className: 'row' }, ...this.buttons), ...this.sheets);
+    this.narrow.addEventListener('change', () => this.begin());
+    this.begin();
+  }
+
+  begin() { this.open(this.sheets.map(() => !this.narrow.matches)); }
+
+  open(which) {
+    which.forEach((opened, i) => {
+      this.sheets[i].hidden = !opened;
+      this.buttons[i].setAttribute('aria-expanded', String(opened));
+    });
+    this.host.className = which.includes(true) ? '' : 'folded';
+    this.changed();
+  }
+
+  fill(...contents) { contents.forEach((content, i) => this.sheets[i].replaceChildren(...content)); }
+}
+
 export function section(title, open, ...children) {
   return element('details', { open }, element('summary', { textContent: title }), ...children);
 }

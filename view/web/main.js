@@ -21,12 +21,12 @@ class App {
     this.dragged = null;
     this.mode = null;   // that is played
     this.ray = null;    // that is drawn: {from, along, places}
+    this.pointer = null;  // a pointer's last place over the picture, until it was looked at
     stage.load(engine);
-    stage.frameAll(engine);
     this.panel = new Panel(document.getElementById('panel'), this);
     this.listen();
     this.fit();
-    this.show();
+    this.seeAll();
   }
 
   listen() {
@@ -39,12 +39,17 @@ class App {
       if (event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement) return;
       if (event.key === ' ') event.preventDefault(), this.setPlaying(!this.playing);
       if (event.key === '.') this.stepOnce();
+      if (event.key === 'Home') this.seeAll();
     });
   }
 
-  fit() {
-    const panel = document.getElementById('panel').getBoundingClientRect().width;
-    this.stage.resize(innerWidth, innerHeight, innerWidth > 700 ? panel : 0);
+  fit() { this.stage.fit(); }
+
+  /** The camera as at first, following nobody. */
+  seeAll() {
+    this.stage.followed = null;
+    this.stage.frameAll(this.engine);
+    this.show();
   }
 
   press(event) {
@@ -59,23 +64,35 @@ class App {
     const hit = this.engine.cast(from, along);
     if (!hit) return;
     event.stopImmediatePropagation();
+    if (this.tool === 'follow') return this.stage.follow(hit.body);
     this.resume();
     if (this.tool === 'poke') this.engine.poke(along);
     if (this.tool === 'pin') this.engine.pin();
     if (this.tool === 'drag' && this.engine.grab()) {
       this.dragged = hit.point;
       event.target.setPointerCapture(event.pointerId);
+      event.target.style.cursor = 'grabbing';
     }
     this.show();
   }
 
   move(event) {
     if (this.dragged) this.engine.dragTo((this.dragged = this.stage.across(event, this.dragged)));
+    this.pointer = event.pointerType === 'mouse' && event.buttons === 0 ? event : null;
+  }
+
+  /** The cursor tells whether a press would meet a body. */
+  hover() {
+    if (this.pointer === null) return;
+    const { from, along } = this.stage.ray(this.pointer);
+    this.stage.renderer.domElement.style.cursor = this.engine.cast(from, along) ? (this.tool === 'drag' ? 'grab' : 'pointer') : '';
+    this.pointer = null;
   }
 
   release() {
     if (this.dragged) this.engine.letGo();
     this.dragged = null;
+    this.stage.renderer.domElement.style.cursor = '';
     this.show();
   }
 
@@ -179,6 +196,7 @@ class App {
     }
     // Modes of any frequency are seen to swing once a second.
     if (this.mode) this.bend(this.mode.body, this.mode.mode, Math.sin((2e-3 * Math.PI) * (performance.now() - this.mode.began)));
+    this.hover();
     this.show();
   }
 
@@ -212,4 +230,4 @@ async function main() {
   requestAnimationFrame(draw);
 }
 
-main().catch((error) => tell(error.message));
+main().catch((error) => tell(error.message)).finally(() => document.getElementById('loading').remove());

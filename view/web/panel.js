@@ -1,20 +1,32 @@
 // The controls at the side.
-import { button, choice, element, section, slider } from './dom.js';
+import { button, choice, element, section, Sheets, slider } from './dom.js';
 import { Chart } from './charts.js';
 
-const TOOLS = [['drag', 'Drag'], ['poke', 'Poke'], ['pin', 'Pin'], ['ray', 'Ray']];
+const TOOLS = [['drag', 'Drag'], ['poke', 'Poke'], ['pin', 'Pin'], ['ray', 'Ray'], ['follow', 'Follow']];
+const KEYS = [['Space', 'pause, play'], ['.', 'one step'], ['Home', 'see all'], ['Ctrl', 'with a drag beside the bodies: move the view']];
+/** Which coordinates of a joint are angles. */
+const ANGLES = { revolute: [true], prismatic: [false], cylindrical: [true, false], planar: [false, false, true], ball: [true, true, true], fixed: [] };
+const MANY = 6;  // models: more fill the panel
 const SOLVERS = [['game', 'game'], ['exact', 'exact']];
+
+const count = (number, one, many) => `${number} ${number === 1 ? one : many}`;
+
+/** Angles in degrees, lengths in metres; a limit of null is open. */
+function coordinate(angle, x, low, high) {
+  const text = (y) => (angle ? `${((180 / Math.PI) * y).toFixed(1)}°` : `${y.toPrecision(3)} m`);
+  return low === null && high === null ? text(x) : `${text(x)} in [${low === null ? '−∞' : text(low)}, ${high === null ? '∞' : text(high)}]`;
+}
 
 export class Panel {
   constructor(host, app) {
     this.app = app;
     this.energy = new Chart('Energy', 'J', [['motion', '#3d7ab8'], ['modes', '#d9822b'], ['all', '#1d2430']]);
     this.time = new Chart('A step takes', 'ms', [['all', '#1d2430'], ['contacts looked for', '#3d7ab8'], ['contacts and joints solved', '#d9822b'], ['the rest', '#5f9e4f']]);
-    this.stages = [0, 0, 0];
+    this.means = [0, 0, 0, 0];  // ms: a step, and its parts
     this.contacts = new Chart('Contacts', '', [['', '#b0508c']]);
     this.state = element('small');
     this.joints = element('table');
-    this.host = host;
+    this.sheets = new Sheets(host, ['Controls', 'Details'], () => app.fit());
     this.build();
   }
 
@@ -22,18 +34,20 @@ export class Panel {
     const { app } = this, { scene } = app.engine;
     this.scrub = slider('Time', { min: 0, max: 0, step: 1, value: 0, show: () => '' }, (key) => app.goTo(key));
     this.tools = TOOLS.map(([name, text]) => button(text, () => this.choose(name)));
-    this.host.replaceChildren(
+    this.sheets.fill([
       element('h1', { textContent: scene.name }),
       this.clock(),
       section('Hand', true, element('div', { className: 'row' }, ...this.tools, button('Let pins go', () => app.unpin())),
         this.live('drag_frequency', 'Hand', { min: 0.5, max: 12, step: 0.1, show: (x) => `${x.toFixed(1)} Hz` }),
         this.live('poke_speed', 'Poke', { min: 0.05, max: 5, step: 0.05, show: (x) => `${x.toFixed(2)} m/s` }),
-        ...this.drops()),
+        this.drops())], [
       section('World', true, ...this.world()),
       section('Modes', scene.joints.length === 0 && !scene.contact, ...this.modes()),
       section('Joints', scene.joints.length > 0, this.joints),
       section('Charts', true, this.energy.element, this.time.element, this.contacts.element, this.state),
-      section('About', false, element('small', { textContent: document.getElementById('licences').textContent })));
+      section('Keys', false, element('table', {}, ...KEYS.map(([key, does]) =>
+        element('tr', {}, element('td', { textContent: key }), element('td', { textContent: does }))))),
+      section('About', false, element('small', { textContent: document.getElementById('licences').textContent }))]);
     this.choose('drag');
   }
 
@@ -41,7 +55,7 @@ export class Panel {
     const { app } = this;
     this.play = button('Pause', () => app.setPlaying(!app.playing));
     return element('div', {}, element('div', { className: 'row' }, this.play, button('Step', () => app.stepOnce()),
-      button('Start again', () => app.restart()), button('Save GLB', () => app.save())),
+      button('Start again', () => app.restart()), button('See all', () => app.seeAll()), button('Save GLB', () => app.save())),
       slider('Speed', { min: 0.02, max: 1, step: 0.02, value: app.speed, show: (x) => `× ${x.toFixed(2)}` }, (x) => { app.speed = x; }),
       this.scrub);
   }
@@ -81,8 +95,8 @@ export class Panel {
 
   drops() {
     const { app } = this;
-    return [element('div', { className: 'row' }, 'Drop', ...app.engine.scene.models.map((model, i) =>
-      button(model.name, () => app.drop(i))))];
+    return section('Drop', app.engine.scene.models.length <= MANY, element('div', { className: 'row' }, ...app.engine.scene.models.map((model, i) =>
+      button(model.name, () => app.drop(i)))));
   }
 
   modes() {
@@ -117,7 +131,7 @@ export class Panel {
     for (const chart of [this.energy, this.time, this.contacts]) chart.draw();
     const force = Math.hypot(...hand.force);
     this.state.textContent = (hand.holds ? `hand pulls ${force.toPrecision(3)} N; ` : '') +
-      `${app.engine.scene.bodies.length} bodies, ${numbers.asleep} asleep, ${hand.pins} pins, state ${app.engine.hash()}` +
+      `${count(app.engine.scene.bodies.length, 'body', 'bodies')}, ${numbers.asleep} asleep, ${count(hand.pins, 'pin', 'pins')}, state ${app.engine.hash()}` +
       (numbers.solved ? '' : '; some islands ended at a limit');
     this.showJoints();
     this.showRay();
@@ -133,21 +147,19 @@ export class Panel {
 
   /** @param stages seconds: the browser's clock is coarse, so that only means over many steps tell something */
   note(numbers, milliseconds, stages) {
-    const [begin, ahead, broad, narrow, rows, advance, solve, commit] = stages;
-    [ahead + broad + narrow, rows + solve + commit, begin + advance].forEach((seconds, i) => {
-      this.stages[i] += (1000 * seconds - this.stages[i]) / 30;
-    });
+    const [, ahead, broad, narrow, rows, , solve, commit] = stages;
+    const looked = 1000 * (ahead + broad + narrow), solved = 1000 * (rows + solve + commit);
+    [milliseconds, looked, solved, milliseconds - looked - solved].forEach((x, i) => { this.means[i] += (x - this.means[i]) / 30; });
     this.energy.add([numbers.rigid, numbers.modal + numbers.elastic, numbers.rigid + numbers.modal + numbers.elastic + numbers.potential]);
-    this.time.add([milliseconds, ...this.stages]);
+    this.time.add([...this.means]);
     this.contacts.add([numbers.contacts]);
   }
 
   showJoints() {
     const { joints } = this.app.engine.scene, frames = this.app.engine.jointFrames();
-    const text = (x) => (x === null ? '∞' : x.toFixed(2));
     this.joints.replaceChildren(...joints.map((joint, j) => element('tr', {},
       element('td', { textContent: `${joint.a || 'world'} – ${joint.b}` }), element('td', { textContent: joint.type }),
       element('td', { textContent: joint.limits.map(([low, high], i) =>
-        `${frames[9 * j + 6 + i].toFixed(2)} in [${low === null ? '−∞' : text(low)}, ${text(high)}]`).join('; ') }))));
+        coordinate(ANGLES[joint.type][i], frames[9 * j + 6 + i], low, high)).join('; ') }))));
   }
 }

@@ -34,10 +34,10 @@ export class PoseApp {
     this.points.frustumCulled = false;
     stage.scene.add(this.points);
     this.geometry.computeBoundingBox();
-    stage.look(this.geometry.boundingBox);
     this.panel = new PosePanel(document.getElementById('panel'), this);
     this.listen();
     this.fit();
+    stage.look(this.geometry.boundingBox);
     this.changed();
   }
 
@@ -52,10 +52,7 @@ export class PoseApp {
     });
   }
 
-  fit() {
-    const panel = document.getElementById('panel').getBoundingClientRect().width;
-    this.stage.resize(innerWidth, innerHeight, innerWidth > 700 ? panel : 0);
-  }
+  fit() { this.stage.fit(); }
 
   /** A handle near the pointer is taken again; else the surface under it gets a new one. */
   press(event) {

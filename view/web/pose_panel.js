@@ -1,5 +1,5 @@
 // The controls of a model that is posed: its parts, its joints.
-import { button, choice, element, section } from './dom.js';
+import { button, choice, element, section, Sheets } from './dom.js';
 
 const TYPES = ['ball', 'revolute', 'cylindrical', 'prismatic', 'planar', 'fixed'];
 /** Members of `limits` (docs/formats/joints.md) that a person may set, with what they are called here. */
@@ -11,9 +11,9 @@ const MEMBERS = {
 export class PosePanel {
   constructor(host, app) {
     this.app = app;
-    this.host = host;
     this.state = element('small');
     this.lists = [];  // of joints
+    this.sheets = new Sheets(host, ['Pose', 'Parts and joints'], () => app.fit());
     this.build();
   }
 
@@ -22,15 +22,15 @@ export class PosePanel {
     this.coordinates = [];
     const opened = this.lists.map((list) => list.open);  // an event of it may still be on its way
     this.lists = scene.joints.map((joint, j) => this.joint(joint, j, opened[j] ?? false));
-    this.host.replaceChildren(
+    this.sheets.fill([
       element('h1', { textContent: scene.name }),
       element('div', { className: 'row' }, button('Undo', () => app.undo()), button('Back to rest', () => app.reset()),
         button('Let all go', () => app.change(() => app.engine.removeHandles())), button('Save', () => app.save())),
       element('small', { textContent: 'Pull at any point: it stays where it is let go. Pull at a red point to move it again.' }),
+      this.state], [
       section('Parts', true, ...scene.parts.map((part, i) => this.part(part, i))),
       section('Joints', true, ...this.lists),
-      this.state,
-      section('About', false, element('small', { textContent: document.getElementById('licences').textContent })));
+      section('About', false, element('small', { textContent: document.getElementById('licences').textContent }))]);
   }
 
   part(part, i) {

@@ -1,6 +1,7 @@
 // What is seen: camera, light, bodies, shapes that stand still, outlines of sensors, axes of joints, the hand, a ray.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { NARROW } from './dom.js';
 import { SurfaceBody, SurfaceModel } from './surface.js';
 
 const UP = new THREE.Vector3(0, 0, 1);
@@ -31,6 +32,8 @@ export class Stage {
     this.models = [];
     this.bodies = [];
     this.caster = new THREE.Raycaster();
+    this.followed = null;  // {body, position}
+    this.free = 1;         // of the picture's height: the smaller side of what the panel leaves
   }
 
   lines(color) {
@@ -79,11 +82,24 @@ export class Stage {
       body.set(frame.subarray(at, at + engine.sizes[i]));
       at += engine.sizes[i];
     });
+    this.goAlong();
     this.drawJoints(engine);
     engine.sensorCounts().forEach((count, i) => this.sensors.children[i].material.color.set(count > 0 ? 0xd9822b : 0x2f7d5b));
     const hand = engine.hand();
     setLines(this.hand, hand.holds ? [...hand.point, ...hand.target] : []);
     return hand;
+  }
+
+  follow(body) { this.followed = { body, position: this.bodies[body].mesh.position.clone() }; }
+
+  /** The camera goes where the body that it follows went. */
+  goAlong() {
+    const mesh = this.bodies[this.followed?.body]?.mesh;
+    if (mesh === undefined) return;
+    const way = mesh.position.clone().sub(this.followed.position);
+    this.camera.position.add(way);
+    this.controls.target.add(way);
+    this.followed.position.copy(mesh.position);
   }
 
   /** A ray as far as the last place that it meets, and the normals there. */
@@ -126,7 +142,7 @@ export class Stage {
     this.size = Math.max(box.getSize(new THREE.Vector3()).length(), 1e-3);
     if (onGround) middle.z *= 0.6;
     this.controls.target.copy(middle);
-    this.camera.position.copy(middle).addScaledVector(new THREE.Vector3(0.35, -1, 0.45).normalize(), 1.5 * this.size);
+    this.camera.position.copy(middle).addScaledVector(new THREE.Vector3(0.35, -1, 0.45).normalize(), (1.5 * this.size) / this.free);
     this.camera.near = 0.01 * this.size;
     this.camera.far = 60 * this.size;
     this.sun.position.copy(middle).addScaledVector(new THREE.Vector3(0.4, -0.5, 1).normalize(), 2 * this.size);
@@ -163,11 +179,14 @@ export class Stage {
     return this.caster.ray.intersectPlane(plane, new THREE.Vector3())?.toArray() ?? point;
   }
 
-  resize(width, height, panel) {
+  /** To the window: the scene is in the middle of what the panel leaves free. */
+  fit() {
+    const width = innerWidth, height = innerHeight, panel = document.getElementById('panel').getBoundingClientRect();
+    const below = matchMedia(NARROW).matches, right = below ? 0 : panel.width, foot = below ? panel.height : 0;
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
-    // The scene is in the middle of what the panel leaves free.
-    this.camera.setViewOffset(width, height, panel / 2, 0, width, height);
+    this.free = Math.min(1, (width - right) / height, (height - foot) / height);
+    this.camera.setViewOffset(width, height, right / 2, foot / 2, width, height);
     this.camera.updateProjectionMatrix();
   }
 
@@ -203,7 +222,8 @@ function standing({ points, triangles, ground }) {
   const flat = geometry.toNonIndexed();
   geometry.dispose();
   flat.computeVertexNormals();
-  const mesh = new THREE.Mesh(flat, new THREE.MeshStandardMaterial({ color: ground ? 0xdfe3ea : 0xa9b1bd, roughness: 0.9, side: THREE.DoubleSide }));
+  const side = ground ? THREE.FrontSide : THREE.DoubleSide;  // a camera below the ground looks through it
+  const mesh = new THREE.Mesh(flat, new THREE.MeshStandardMaterial({ color: ground ? 0xdfe3ea : 0xa9b1bd, roughness: 0.9, side }));
   mesh.receiveShadow = true;
   mesh.castShadow = !ground;
   return mesh;
