@@ -36,14 +36,14 @@ let probing = false;  // what is refused then is told on the console, as it shou
 const plays = (page) => page.evaluate(() => globalThis.limber !== undefined || document.getElementById('message').textContent !== '');
 
 /** Opens a page and waits until it plays or says why not. */
-export async function open(path, holds = plays) {
+export async function open(path, holds = plays, fragment = '') {
   const page = await browser.newPage(), url = pathToFileURL(resolve(path)).href;
   page.on('console', (message) => { if (message.type() === 'error' && !probing) wrong.push(`console: ${message.text()}`); });
   page.on('pageerror', (error) => wrong.push(`an error in the page: ${error.message}`));
   page.on('request', (request) => {
-    if (request.url() !== url && !/^(data|blob):/.test(request.url())) wrong.push(`a request: ${request.url().slice(0, 200)}`);
+    if (request.url().split('#')[0] !== url && !/^(data|blob):/.test(request.url())) wrong.push(`a request: ${request.url().slice(0, 200)}`);
   });
-  await page.goto(url);
+  await page.goto(url + fragment);
   await until(() => holds(page));
   return page;
 }

@@ -236,6 +236,35 @@ async function follows(page) {
   await page.locator('#panel button:has-text("Drag")').click();
 }
 
+/** Steps that take long do not heap up in a frame. */
+async function answersWhileStepsAreSlow(page) {
+  await fromTheStart(page);
+  const taken = (milliseconds) => page.evaluate((milliseconds) => {
+    const app = globalThis.limber, step = app.step;
+    let count = 0;
+    app.step = () => {
+      ++count;
+      for (const began = performance.now(); performance.now() - began < milliseconds;) continue;
+    };
+    app.playing = true;
+    app.frame(1);
+    app.step = step;
+    app.setPlaying(false);
+    return count;
+  }, milliseconds);
+  check((await taken(150)) === 1, 'a slow step is the only one of its frame');
+  check((await taken(0)) > 1, 'quick steps catch up');
+}
+
+/** A page's address may ask for a pause. */
+async function waitsWhereAsked() {
+  const page = await open(file, undefined, '#paused');
+  check(await page.evaluate(() => !globalThis.limber.playing && globalThis.limber.engine.steps() === 0), 'it begins with a pause');
+  await page.keyboard.press(' ');
+  check(await until(() => page.evaluate(() => globalThis.limber.engine.steps() > 0)), 'and goes on');
+  await page.close();
+}
+
 /** On a phone: folded sheets below the picture, controls for fingers, nothing cut off. */
 async function fitsAPhone(page) {
   const size = page.viewportSize(), folded = picture?.replace('.png', '.phone.png'), unfolded = picture?.replace('.png', '.phone_controls.png');
@@ -347,10 +376,12 @@ await run('check_page', file, async () => {
     await showsWhatCanBeHeld(page);
     await looksThroughTheGround(page);
     await follows(page);
+    await answersWhileStepsAreSlow(page);
     await fitsAPhone(page);
     check((await page.evaluate(() => document.querySelectorAll('img, iframe, object, embed').length)) === 0, 'no text has become markup');
   }
   await page.close();
+  await waitsWhereAsked();
   await tellsOfDamage();
   await tellsOfABrokenDownload();
 });

@@ -8,13 +8,14 @@ import { PoseEngine } from './pose_engine.js';
 import { Stage } from './stage.js';
 
 const MOST_STEPS_A_FRAME = 6;
+const LONGEST_FRAME = 100;  // ms, after which no other step begins: a heavy scene goes slower, and the page still answers
 
 class App {
   constructor(engine, stage) {
     this.engine = engine;
     this.stage = stage;
     this.settings = structuredClone(engine.scene.settings);
-    this.playing = true;
+    this.playing = location.hash !== '#paused';
     this.speed = 1;
     this.left = 0;      // s of real time not yet stepped
     this.key = null;    // of the history, where one has scrubbed to it
@@ -192,7 +193,8 @@ class App {
   frame(seconds) {
     if (this.playing) {
       this.left = Math.min(this.left + this.speed * seconds, MOST_STEPS_A_FRAME * this.engine.scene.settings.step);
-      for (; this.left >= this.engine.scene.settings.step; this.left -= this.engine.scene.settings.step) this.step();
+      const began = performance.now(), { step } = this.engine.scene.settings;
+      for (; this.left >= step && performance.now() - began < LONGEST_FRAME; this.left -= step) this.step();
     }
     // Modes of any frequency are seen to swing once a second.
     if (this.mode) this.bend(this.mode.body, this.mode.mode, Math.sin((2e-3 * Math.PI) * (performance.now() - this.mode.began)));
