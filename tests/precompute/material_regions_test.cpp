@@ -163,15 +163,16 @@ std::vector<double> roots(const std::function<double(double)>& f, double step, s
   return found;
 }
 
-TetMesh meshed_bar(const Vec3& size) {
+TetMesh meshed_bar(const Vec3& size, std::vector<SurfaceMesh> inner = {}) {
   Warnings warnings;
-  return tetrahedralise(boundary_surface(testing::tet_box(1, 1, 1, size)).surface, {.quadratic = true}, warnings).mesh;
+  return tetrahedralise(boundary_surface(testing::tet_box(1, 1, 1, size)).surface,
+                        {.quadratic = true, .inner_surfaces = std::move(inner)}, warnings)
+      .mesh;
 }
 
 // u' = 0 at both ends, u and E u' the same on both sides of the joint:
 // Z1 sin(k1 L1) cos(k2 L2) + Z2 cos(k1 L1) sin(k2 L2) = 0, Z = √(E ρ).
-TEST(MaterialRegions, ABarOfTwoMaterialsRingsAsItsClosedForm) {
-  const double length = 0.3, first = 0.12;
+std::vector<double> two_materials_hz(double length, double first) {
   const auto impedance = [](const Material& m) { return std::sqrt(m.youngs_modulus * m.density); };
   const auto slowness = [](const Material& m) { return std::sqrt(m.density / m.youngs_modulus); };
   const auto misfit = [&](double hz) {
@@ -179,7 +180,12 @@ TEST(MaterialRegions, ABarOfTwoMaterialsRingsAsItsClosedForm) {
     const double b = 2.0 * kPi * hz * slowness(kStiff) * (length - first);
     return impedance(kSoft) * std::sin(a) * std::cos(b) + impedance(kStiff) * std::cos(a) * std::sin(b);
   };
-  const std::vector<double> expected = roots(misfit, 100.0, 2);
+  return roots(misfit, 100.0, 2);
+}
+
+TEST(MaterialRegions, ABarOfTwoMaterialsRingsAsItsClosedForm) {
+  const double length = 0.3, first = 0.12;
+  const std::vector<double> expected = two_materials_hz(length, first);
   const Vec3 size(length, 0.05, 0.03);
   const std::vector<MaterialRegion> regions{
       {"soft", InsideHalfSpace{.point = Vec3(first, 0, 0), .normal = Vec3::UnitX()}, kSoft}};
@@ -189,6 +195,19 @@ TEST(MaterialRegions, ABarOfTwoMaterialsRingsAsItsClosedForm) {
     EXPECT_NEAR(followed[i], expected[i], 1e-4 * expected[i]) << "faces of tets lie in the joint, mode " << i;
     EXPECT_NEAR(meshed[i], expected[i], 0.01 * expected[i]) << "the joint runs along the nearest faces, mode " << i;
   }
+}
+
+// The joint lies on no grid. The shell leaves the bar at its end and below, and lies in its other sides.
+TEST(MaterialRegions, TetsThatFollowAShellRingAsTheClosedFormOfABarOfTwoMaterials) {
+  const double length = 0.3, first = 0.11373, beyond = 0.02;
+  const Vec3 size(length, 0.05, 0.03);
+  SurfaceMesh shell =
+      boundary_surface(testing::tet_box(1, 1, 1, {first + beyond, size.y(), size.z() + beyond})).surface;
+  for (Vec3& v : shell.vertices) v -= Vec3(beyond, 0, beyond);
+  const std::vector<double> expected = two_materials_hz(length, first),
+                            found =
+                                longitudinal_hz(meshed_bar(size, {shell}), {{"soft", InsideShells{shell}, kSoft}}, 2);
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(found[i], expected[i], 2e-4 * expected[i]) << "mode " << i;
 }
 
 // E and ρ as (1 + a x)²: with u = v / (1 + a x), v'' + k² v = 0, and free ends give

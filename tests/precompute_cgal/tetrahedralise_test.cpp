@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "limber/core/error.h"
+#include "limber/mesh/winding_number.h"
 #include "soup.h"
 
 namespace limber {
@@ -284,6 +285,77 @@ TEST(Tetrahedralise, WideCellsStayNearACurvedSurface) {
   }
   EXPECT_NEAR(r.volume_after, r.volume_before, 5e-3 * r.volume_before);
   EXPECT_TRUE(surface_quality(boundary_surface(r.mesh).surface).closed_manifold());
+}
+
+/// Volume of the tets on the inner side of a surface, of which each is asked to lie on one side whole.
+double volume_inside(const TetMesh& mesh, const SurfaceMesh& surface) {
+  double volume = 0.0;
+  Index straddling = 0;
+  for (std::size_t i = 0; i < mesh.tets.size(); ++i) {
+    Vec3 middle = Vec3::Zero();
+    for (const Index n : mesh.tets[i]) middle += 0.25 * mesh.nodes[n];
+    int inside = 0;
+    for (const Index n : mesh.tets[i])
+      inside += std::abs(winding_number(surface, middle + 0.99 * (mesh.nodes[n] - middle))) > 0.5 ? 1 : 0;
+    if (inside % 4 != 0) ++straddling;
+    if (inside == 4) volume += signed_volume(mesh, static_cast<Index>(i));
+  }
+  EXPECT_EQ(straddling, 0);
+  return volume;
+}
+
+/// Moves points of height z by `per_height` · z along x.
+SurfaceMesh leaning(SurfaceMesh surface, double per_height) {
+  for (Vec3& v : surface.vertices) v.x() += per_height * v.z();
+  return surface;
+}
+
+TEST(Tetrahedralise, FacesFollowASurfaceInsideOneThatCutsTheBoundaryAndOneThatLiesInIt) {
+  const SurfaceMesh box = shapes::box({0, 0, 0}, {1, 0.3, 0.2});
+  const std::vector<SurfaceMesh> inner{shapes::box({0.613, 0.0771, 0.0513}, {0.877, 0.211, 0.1493}),
+                                       leaning(shapes::box({0.1, -0.1, -0.1}, {0.24, 0.4, 0.3}), 0.5),
+                                       shapes::box({0.95, 0, 0}, {1, 0.3, 0.2})};
+  const double volumes[] = {0.264 * 0.1339 * 0.098, 0.14 * 0.3 * 0.2, 0.05 * 0.3 * 0.2};
+  for (const bool quadratic : {false, true}) {
+    Warnings warnings;
+    const auto r = tetrahedralise(box, {.quadratic = quadratic, .inner_surfaces = inner}, warnings);
+    EXPECT_THAT(warnings, IsEmpty());
+    EXPECT_THAT(r.followed, ElementsAre(true, true, true));
+    EXPECT_NEAR(r.volume_after, 0.06, kRoundOff);
+    for (std::size_t i = 0; i < inner.size(); ++i)
+      EXPECT_NEAR(volume_inside(r.mesh, inner[i]), volumes[i], kRoundOff) << i;
+  }
+}
+
+TEST(Tetrahedralise, NodesBetweenTheSidesOfACurvedSurfaceKeepWithinATenthOfACell) {
+  const Vec3 center(0.7, 0, 0);
+  const double radius = 0.6, cell = 0.2;
+  const SurfaceMesh shell = shapes::sphere(center, radius, 4);  // leaves the ball
+  Warnings warnings;
+  const auto r =
+      tetrahedralise(shapes::sphere({0, 0, 0}, 1.0, 4), {.cell_size = cell, .inner_surfaces = {shell}}, warnings);
+  EXPECT_THAT(r.followed, ElementsAre(true));
+  std::vector<int> sides(r.mesh.nodes.size());  // of the shell, on which tets at a node lie
+  for (const Tet& tet : r.mesh.tets) {
+    Vec3 middle = Vec3::Zero();
+    for (const Index n : tet) middle += 0.25 * r.mesh.nodes[n];
+    for (const Index n : tet) sides[n] |= (middle - center).norm() < radius ? 1 : 2;
+  }
+  Index between = 0;
+  for (std::size_t n = 0; n < sides.size(); ++n) {
+    if (sides[n] != 3) continue;
+    ++between;
+    EXPECT_NEAR((r.mesh.nodes[n] - center).norm(), radius, kBoundaryError * cell);
+  }
+  EXPECT_GT(between, 50);
+}
+
+TEST(Tetrahedralise, AnInnerSurfaceThatIsOpenIsToldNotFollowed) {
+  SurfaceMesh open = shapes::box({0.2, 0.2, 0.2}, {0.8, 0.8, 0.8});
+  open.triangles.pop_back();
+  Warnings warnings;
+  const auto r = tetrahedralise(shapes::box({0, 0, 0}, {1, 1, 1}), {.inner_surfaces = {open}}, warnings);
+  EXPECT_THAT(r.followed, ElementsAre(false));
 }
 
 }  // namespace

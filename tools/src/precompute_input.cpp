@@ -1,6 +1,7 @@
 #include "precompute_input.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -48,12 +49,28 @@ nlohmann::ordered_json surface_report(const SurfaceMesh& surface, const Tetrahed
           {"volume_after", t.volume_after}};
 }
 
+/// Names the regions whose shells faces of tets follow, and those whose boundaries run along the nearest faces.
+void tell_followed_regions(Program& program, const BakeOptions& bake, const Tetrahedralisation& t) {
+  std::vector<std::string> followed, nearest;
+  std::size_t surface = 0;
+  for (const MaterialRegion& region : bake.regions)
+    if (!std::holds_alternative<Everywhere>(region.shape))
+      (std::holds_alternative<InsideShells>(region.shape) && t.followed[surface++] ? followed : nearest)
+          .push_back(region.name);
+  program.report()["surface"]["followed_regions"] = followed;
+  if (!followed.empty()) program.print(fmt::format("faces of tets follow: {}\n", fmt::join(followed, ", ")));
+  if (!nearest.empty()) program.print(fmt::format("tets belong by their centroids to: {}\n", fmt::join(nearest, ", ")));
+}
+
 /// Fills a surface with tets, told of failures by the file's name.
-Tetrahedralisation tets_of(Program& program, const PrecomputeArguments& a, const SurfaceMesh& surface, double cell_size,
-                           Warnings& warnings) {
+Tetrahedralisation tets_of(Program& program, const PrecomputeArguments& a, const BakeOptions& bake,
+                           const SurfaceMesh& surface, double cell_size, Warnings& warnings) {
   TetrahedralisationOptions options = a.geometry.tets;
   options.cell_size = cell_size;
   options.quadratic = a.modal.elements != "linear";
+  for (const MaterialRegion& region : bake.regions)
+    if (const auto* shells = std::get_if<InsideShells>(&region.shape))
+      options.inner_surfaces.push_back(shells->surface);
   options.progress = [&](const std::string& stage) { program.progress().stage(stage); };
   try {
     return tetrahedralise(surface, options, warnings);
@@ -77,7 +94,7 @@ struct TriedCells {
 TriedCells try_cells(Program& program, const PrecomputeArguments& a, const BakeInput& input, BakeOptions options,
                      double cell_size) {
   TriedCells tried;
-  tried.tets = tets_of(program, a, *input.render, cell_size, tried.warnings);
+  tried.tets = tets_of(program, a, options, *input.render, cell_size, tried.warnings);
   choose_elements(a, true, false, options);
   options.analysis.modes = options.limits.max_modes = kModesTold;
   options.residual = {};
@@ -127,13 +144,14 @@ void fill_with_tets(Program& program, const PrecomputeArguments& a, const BakeOp
                     Stopwatch& stopwatch) {
   Tetrahedralisation t = stopwatch.time("tetrahedralise", [&] {
     return a.modal.frequency_error.empty()
-               ? tets_of(program, a, *input.render, a.geometry.tets.cell_size, program.warnings())
+               ? tets_of(program, a, bake, *input.render, a.geometry.tets.cell_size, program.warnings())
                : cells_by_error(program, a, input, bake);
   });
   stopwatch.add("wrap", t.seconds_wrap);
   stopwatch.add("thickness", t.seconds_thickness);
   stopwatch.add("mesh", t.seconds_mesh);
   program.report()["surface"] = surface_report(*input.render, t);
+  tell_followed_regions(program, bake, t);
   const std::string done = t.wrapped         ? ", wrapped (" + t.why_wrapped + ")"
                            : t.mending.any() ? ", mended (" + t.mending.text() + ")"
                                              : "";

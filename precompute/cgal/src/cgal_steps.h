@@ -1,4 +1,4 @@
-// The three steps that need CGAL, one source file each, so that they compile side by side and no CGAL header spreads.
+// The steps that need CGAL, one source file each, so that they compile side by side and no CGAL header spreads.
 #pragma once
 
 #include <functional>
@@ -18,6 +18,13 @@ struct Crossings {
 };
 Crossings find_crossings(const SurfaceMesh& surface);
 
+/// Leaves of a surface what lies strictly inside a body, cut where it crosses the boundary. The cuts become edges of
+/// both.
+/// @param surface closed, manifold, without self-intersections; either orientation
+/// @param boundary of the body: clean, outward
+/// @return whether both are manifold after that; if not, they are as they were
+bool clip_to_body(SurfaceMesh& surface, SurfaceMesh& boundary);
+
 /// A closed, oriented, manifold surface around any triangles, `offset` away from them; enters no gap narrower than
 /// `alpha`.
 SurfaceMesh wrap(const SurfaceMesh& soup, double alpha, double offset);
@@ -36,7 +43,9 @@ struct MeshedBody {
 };
 
 /// Tets inside one body. @param boundary clean; its shells bound the body by the even-odd rule
-/// @param seeds points on the boundary, a few of each shell, where the refinement starts
-MeshedBody mesh_body(const SurfaceMesh& boundary, std::span<const Vec3> seeds, const BodyMeshing& options);
+/// @param inner surfaces inside, which faces of tets follow; their open edges are edges of the boundary
+/// @param seeds points on all of these, a few of each shell, where the refinement starts
+MeshedBody mesh_body(const SurfaceMesh& boundary, std::span<const SurfaceMesh> inner, std::span<const Vec3> seeds,
+                     const BodyMeshing& options);
 
 }  // namespace limber::internal

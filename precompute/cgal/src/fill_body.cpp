@@ -114,7 +114,7 @@ Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) 
   const double expected = expected_nodes(body.samples, body.body->volume, how.cell_size, smallest_cell);
   // Half the distance to a curved side asks for twice as many nodes on it.
   const double runaway = kRunaway * (how.wide_cells ? kFacetDistancePerCell / kFacetDistancePerWideCell : 1.0);
-  Judged j = judge(mesh_body(body.body->boundary, body.body->seeds,
+  Judged j = judge(mesh_body(body.body->boundary, body.body->inner, body.body->seeds,
                              {.cell_size = size,
                               .facet_distance = how.wide_cells ? kFacetDistancePerWideCell : kFacetDistancePerCell,
                               .keep_sharp_edges = how.keep_sharp_edges,
@@ -122,6 +122,17 @@ Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) 
                    *body.body);
   j.filled.sharp_edges_kept = how.keep_sharp_edges;
   return j;
+}
+
+/// The boundary and the inner surfaces, between which cells must fit.
+SurfaceMesh all_surfaces(const Body& body) {
+  SurfaceMesh all = body.boundary;
+  for (const SurfaceMesh& surface : body.inner) {
+    const auto first = static_cast<Index>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), surface.vertices.begin(), surface.vertices.end());
+    for (const Triangle& t : surface.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  return all;
 }
 
 }  // namespace
@@ -134,7 +145,7 @@ double MeasuredBody::expected_nodes(double smallest) const {
 
 MeasuredBody measure(const Body& body, double cell_size) {
   const double size = std::min(cell_size, body.diagonal / kLeastCellsPerBody);
-  return {&body, size, sample_thickness(body.boundary, size / kSamplesPerCell, size)};
+  return {&body, size, sample_thickness(all_surfaces(body), size / kSamplesPerCell, size)};
 }
 
 double smallest_affordable_cell(const std::vector<MeasuredBody>& bodies, double most_nodes) {
@@ -154,7 +165,9 @@ double smallest_affordable_cell(const std::vector<MeasuredBody>& bodies, double 
   return high;
 }
 
-FilledBody fill(const MeasuredBody& body, double smallest_cell, const Filling& filling) {
+FilledBody fill(const MeasuredBody& body, double smallest_cell, const Filling& asked) {
+  Filling filling = asked;
+  filling.wide_cells = asked.wide_cells && body.body->inner.empty();  // widening would leave the inner surfaces
   Judged best;
   int tries = 0;
   const auto attempt = [&](const Attempt& how) {

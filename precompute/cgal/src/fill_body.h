@@ -37,7 +37,7 @@ struct FilledBody {
 
 struct Filling {
   bool keep_sharp_edges = false;
-  bool wide_cells = false;  ///< where the body is thin, wider than it is thick: what ten-node tets need
+  bool wide_cells = false;  ///< where a body without inner surfaces is thin, wider than it is thick: for ten-node tets
 };
 
 /// The first good mesh, or else the best; if that is less than half of the body's volume, none. Good is: without flat

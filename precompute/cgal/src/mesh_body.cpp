@@ -11,6 +11,7 @@
 
 #include <string>
 #include <unordered_map>
+#include <vector>
 
 #include "cgal_steps.h"
 #include "limber/core/error.h"
@@ -102,14 +103,14 @@ void insert_seeds(std::span<const Vec3> seeds, Complex& complex) {
 }
 
 /// Refines until all criteria hold. @return why that came to nothing, or an empty text
-std::string refine(const Domain& domain, const SurfaceMesh& boundary, std::span<const Vec3> seeds,
+std::string refine(const Domain& domain, bool has_curves, const SurfaceMesh& boundary, std::span<const Vec3> seeds,
                    const BodyMeshing& options, Complex& complex) {
   const SizingField cell_size{options.cell_size, 1.0}, facet_distance{options.cell_size, options.facet_distance};
   const Criteria criteria(parameters::edge_size = cell_size, parameters::facet_angle = kFacetDegrees,
                           parameters::facet_size = cell_size, parameters::facet_distance = facet_distance,
                           parameters::cell_radius_edge_ratio = kRadiusEdgeRatio, parameters::cell_size = cell_size);
   CGAL::Mesh_error_code error = CGAL::CGAL_MESH_3_NO_ERROR;
-  if (options.keep_sharp_edges)
+  if (has_curves)
     CGAL::Mesh_3::internal::init_c3t3_with_features(complex, domain, criteria, false, options.max_nodes, &error);
   insert_far_corners(boundary, complex);
   insert_seeds(seeds, complex);
@@ -143,13 +144,22 @@ TetMesh to_tet_mesh(const Complex& complex) {
 
 }  // namespace
 
-MeshedBody mesh_body(const SurfaceMesh& boundary, std::span<const Vec3> seeds, const BodyMeshing& options) {
+MeshedBody mesh_body(const SurfaceMesh& boundary, std::span<const SurfaceMesh> inner, std::span<const Vec3> seeds,
+                     const BodyMeshing& options) {
   try {
     CGAL::get_default_random() = CGAL::Random(0);
-    Domain domain(to_polyhedron(boundary));
-    if (options.keep_sharp_edges) domain.detect_features(kSharpDegrees);
+    std::vector<Polyhedron> followed;
+    for (const SurfaceMesh& surface : inner) followed.push_back(to_polyhedron(surface));
+    std::vector<const Polyhedron*> pointers;
+    for (const Polyhedron& p : followed) pointers.push_back(&p);
+    Domain domain(pointers.begin(), pointers.end(), to_polyhedron(boundary));
+    const bool has_curves = options.keep_sharp_edges || !inner.empty();
+    if (options.keep_sharp_edges)
+      domain.detect_features(kSharpDegrees);
+    else if (!inner.empty())
+      domain.detect_borders();
     Complex complex;
-    const std::string failure = refine(domain, boundary, seeds, options, complex);
+    const std::string failure = refine(domain, has_curves, boundary, seeds, options, complex);
     return {failure.empty() ? to_tet_mesh(complex) : TetMesh(), failure};
   } catch (const CGAL::Failure_exception& e) {
     return {{}, "CGAL: " + (e.message().empty() ? e.expression() : e.message())};

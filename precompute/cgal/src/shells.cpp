@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "cgal_steps.h"
 #include "limber/core/disjoint_sets.h"
 #include "limber/mesh/closed_shells.h"
 
@@ -74,6 +75,23 @@ void add_shell(const SurfaceShell& shell, bool outward, Body& body) {
 }
 
 }  // namespace
+
+bool add_inner_surface(const SurfaceMesh& surface, Bodies& bodies) {
+  SurfaceMesh inward = surface;
+  if (enclosed_volume(inward) > 0.0)
+    for (Triangle& t : inward.triangles) std::swap(t[1], t[2]);
+  std::vector<Body> cut = bodies.bodies;
+  for (Body& body : cut) {
+    SurfaceMesh inside = inward;
+    if (!clip_to_body(inside, body.boundary)) return false;
+    if (inside.triangles.empty()) continue;
+    const auto seeds = spread_vertices(inside);
+    body.seeds.insert(body.seeds.end(), seeds.begin(), seeds.end());
+    body.inner.push_back(std::move(inside));
+  }
+  bodies.bodies = std::move(cut);
+  return true;
+}
 
 Bodies split_into_bodies(const SurfaceMesh& surface) {
   const std::vector<Nested> shells = nested(split_into_shells(surface, shells_of(surface)));

@@ -9,8 +9,10 @@ namespace limber::internal {
 
 /// One body: an outer shell and the cavities directly inside it.
 struct Body {
-  SurfaceMesh boundary;     ///< outer shell outward, cavities inward
-  std::vector<Vec3> seeds;  ///< a few well-spread vertices of each shell
+  SurfaceMesh boundary;  ///< outer shell outward, cavities inward
+  std::vector<SurfaceMesh>
+      inner;                ///< surfaces inside that faces of tets follow, seen from inside; open at the boundary
+  std::vector<Vec3> seeds;  ///< a few well-spread vertices of each shell and inner surface
   double volume = 0.0;      ///< m³; > 0
   double diagonal = 0.0;    ///< of its bounding box, m
 };
@@ -24,5 +26,9 @@ struct Bodies {
 /// Splits a closed, oriented, manifold surface without self-intersections by the even-odd rule: a shell inside a shell
 /// is a cavity, a shell inside a cavity is a body again, whichever way their triangles run.
 Bodies split_into_bodies(const SurfaceMesh& surface);
+
+/// Gives to each body the parts of a clean closed surface that lie in it. @return whether all bodies could be cut by
+/// it; if not, none has it
+bool add_inner_surface(const SurfaceMesh& surface, Bodies& bodies);
 
 }  // namespace limber::internal

@@ -294,7 +294,13 @@ Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const Tetrahedrali
     warn_of_wrap(input, kOffsetPerAlpha * alpha, result, warnings);
   }
 
-  const Bodies bodies = internal::split_into_bodies(input);
+  Bodies bodies = internal::split_into_bodies(input);
+  for (const SurfaceMesh& inner : options.inner_surfaces) {
+    SurfaceMesh clean = inner;
+    validate(clean, "tetrahedralise: an inner surface", warnings);
+    clean = welded(clean);
+    result.followed.push_back(what_is_not_clean(clean).empty() && internal::add_inner_surface(clean, bodies));
+  }
   if (bodies.turned > 0)
     warnings.push_back("tetrahedralise: " + std::to_string(bodies.turned) +
                        " closed shells were inside out for where they lie and have been turned");

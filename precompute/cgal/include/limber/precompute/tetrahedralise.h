@@ -12,6 +12,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "limber/mesh/mend_surface.h"
 #include "limber/mesh/surface_mesh.h"
@@ -32,6 +33,11 @@ struct TetrahedralisationOptions {
   /// where parts are thin 2.5 times as wide as they are thick. Smaller ones go by edge collapse, which keeps flat sides
   /// and sharp edges. max_nodes is then of the mesh before, and about as many as the ten-node tets have.
   bool quadratic = false;
+  /// Closed surfaces, such as shells around another material, which faces of tets follow inside the bodies: no tet lies
+  /// on both sides of one. They may cut the boundary, and parts of them may lie in it or outside. They do not cross
+  /// each other. One that crosses itself or does not close is not followed. A body that they enter gets no wide cells:
+  /// its `quadratic` ones are as wide as it is thin.
+  std::vector<SurfaceMesh> inner_surfaces{};
   /// Told each stage as it begins, in the thread that calls.
   std::function<void(const std::string&)> progress{};
   void validate() const;  ///< @throws InvalidArgument naming the field
@@ -47,6 +53,7 @@ struct Tetrahedralisation {
   double volume_after = 0.0;      ///< of the tets, m³
   double smallest_cell = 0.0;     ///< bound on cells where parts are thin or close, m; may exceed the cell size
   bool sharp_edges_kept = false;  ///< edges sharper than 60° are edges of the mesh
+  std::vector<bool> followed;     ///< which of inner_surfaces faces of tets follow
   int tries = 0;                  ///< meshes made, of all bodies
   double seconds_wrap = 0.0, seconds_thickness = 0.0, seconds_mesh = 0.0;
 };
