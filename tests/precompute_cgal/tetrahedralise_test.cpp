@@ -229,7 +229,7 @@ TEST(Tetrahedralise, AThinShellIsWholeAndManifold) {
 }
 
 TEST(Tetrahedralise, WhatIsTooThinForTheBudgetIsRefusedWithTheBudgetItAsksFor) {
-  const SurfaceMesh plate = shapes::box({0, 0, 0}, {1, 1, 0.03});
+  const SurfaceMesh plate = shapes::box({0, 0, 0}, {1, 1, 0.02});
   const TetrahedralisationOptions poor{.cell_size = 0.4, .max_nodes = 1};
   Warnings warnings;
   const std::string message = message_of<ComputationError>([&] { tetrahedralise(plate, poor, warnings); });
@@ -285,6 +285,17 @@ TEST(Tetrahedralise, WideCellsStayNearACurvedSurface) {
   }
   EXPECT_NEAR(r.volume_after, r.volume_before, 5e-3 * r.volume_before);
   EXPECT_TRUE(surface_quality(boundary_surface(r.mesh).surface).closed_manifold());
+}
+
+// Cells as wide as the section put all nodes on its edges, where tets come out flat: the next tries are finer there
+// too.
+TEST(Tetrahedralise, ABarOfSquareSectionKeepsItsEdges) {
+  for (const double length : {0.1, 0.4}) {
+    Warnings warnings;
+    const auto r = tetrahedralise(shapes::box({0, 0, 0}, {length, 0.004, 0.004}), {.quadratic = true}, warnings);
+    EXPECT_TRUE(r.sharp_edges_kept);
+    EXPECT_NEAR(r.volume_after, 1.6e-5 * length, 1e-9 * 1.6e-5 * length);
+  }
 }
 
 /// Volume of the tets on the inner side of a surface, of which each is asked to lie on one side whole.

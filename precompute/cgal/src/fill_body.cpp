@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "cgal_steps.h"
 #include "coarsen.h"
@@ -17,16 +18,16 @@ constexpr double kSamplesPerCell = 2.0;     ///< along a side
 constexpr double kFacetDistancePerCell = 0.1, kFacetDistancePerWideCell = 0.05;
 /// Refinement that makes this many times the nodes expected is running away.
 constexpr double kRunaway = 2.5;
-constexpr std::size_t kFewNodes = 2000;            ///< are never too many
-constexpr double kWorstShape = 0.01;               ///< flatter tets (see worst_shape) spoil the stiffness
-constexpr double kFiner = 0.8;                     ///< cells of the next try
-constexpr int kTries = 4;                          ///< with smaller and smaller cells
-constexpr int kFailures = 2;                       ///< tries without a mesh, after which smaller cells are no hope
-constexpr double kStrayPart = 0.01;                ///< of its body's volume: a smaller loose piece is dropped
-constexpr double kWorstVolume = 0.1;               ///< of the body's: a worse error is not good
-constexpr double kUselessVolume = 0.5;             ///< a worse error is no mesh of the body
-constexpr double kWidth = 2.5;                     ///< of wide cells, over the thickness
-constexpr double kShortest = 1.0, kLongest = 1.8;  ///< edges of wide cells, over their size
+constexpr std::size_t kFewNodes = 2000;               ///< are never too many
+constexpr double kWorstShape = 0.01;                  ///< flatter tets (see worst_shape) spoil the stiffness
+constexpr double kFiner = std::numbers::sqrt2 / 2.0;  ///< cells of the next try: of half the area
+constexpr int kTries = 4;                             ///< with smaller and smaller cells
+constexpr int kFailures = 2;                          ///< tries without a mesh, after which smaller cells are no hope
+constexpr double kStrayPart = 0.01;                   ///< of its body's volume: a smaller loose piece is dropped
+constexpr double kWorstVolume = 0.1;                  ///< of the body's: a worse error is not good
+constexpr double kUselessVolume = 0.5;                ///< a worse error is no mesh of the body
+constexpr double kWidth = 2.5;                        ///< of wide cells, over the thickness
+constexpr double kShortest = 1.0, kLongest = 1.8;     ///< edges of wide cells, over their size
 constexpr double kDeviation = 0.03;       ///< of the boundary by widening, of the cell size that fits the thickness
 constexpr double kLeastWideShape = 0.05;  ///< a wide cell across a thin part is flat
 constexpr double kLeastSize = 1e-3;       ///< of the cell size: nothing is made smaller for what is thin
@@ -90,7 +91,7 @@ Judged judge(MeshedBody meshed, const Body& body) {
 }
 
 struct Attempt {
-  double cell_size = 0.0;
+  double fineness = 1.0;  ///< factor of all cells that are not the smallest; ≤ 1
   bool keep_sharp_edges = false;
   bool wide_cells = false;
 };
@@ -110,8 +111,12 @@ void widen_cells(const MeasuredBody& body, double smallest_cell, Judged& judged)
 }
 
 Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) {
-  const SizeField size(body.samples, how.cell_size, smallest_cell);
-  const double expected = expected_nodes(body.samples, body.body->volume, how.cell_size, smallest_cell);
+  const double largest = how.fineness * body.cell_size, least = std::min(smallest_cell, largest);
+  const SizeField field(body.samples, body.cell_size, smallest_cell);
+  const auto size = [&](const Vec3& x) { return std::max(how.fineness * field(x), least); };
+  std::vector<ThicknessSample> samples = body.samples;
+  for (ThicknessSample& s : samples) s.thickness *= how.fineness;
+  const double expected = expected_nodes(samples, body.body->volume, largest, least);
   // Half the distance to a curved side asks for twice as many nodes on it.
   const double runaway = kRunaway * (how.wide_cells ? kFacetDistancePerCell / kFacetDistancePerWideCell : 1.0);
   Judged j = judge(mesh_body(body.body->boundary, body.body->inner, body.body->seeds,
@@ -177,10 +182,9 @@ FilledBody fill(const MeasuredBody& body, double smallest_cell, const Filling& a
     if (tries == 1 || grade < best.grade) best = std::move(j);
     return grade;
   };
-  Attempt how{
-      .cell_size = body.cell_size, .keep_sharp_edges = filling.keep_sharp_edges, .wide_cells = filling.wide_cells};
+  Attempt how{.keep_sharp_edges = filling.keep_sharp_edges, .wide_cells = filling.wide_cells};
   int failures = 0;
-  for (int i = 0; i < kTries && failures < kFailures && best.grade != Grade::kGood; ++i, how.cell_size *= kFiner) {
+  for (int i = 0; i < kTries && failures < kFailures && best.grade != Grade::kGood; ++i, how.fineness *= kFiner) {
     bool failed = attempt(how) == Grade::kNone;
     if (failed && how.keep_sharp_edges) {
       how.keep_sharp_edges = false;
@@ -188,8 +192,7 @@ FilledBody fill(const MeasuredBody& body, double smallest_cell, const Filling& a
     }
     failures += failed ? 1 : 0;
   }
-  if (best.grade != Grade::kGood && how.keep_sharp_edges)
-    attempt({.cell_size = body.cell_size, .wide_cells = filling.wide_cells});
+  if (best.grade != Grade::kGood && how.keep_sharp_edges) attempt({.wide_cells = filling.wide_cells});
   if (filling.wide_cells) widen_cells(body, smallest_cell, best);
   best.filled.tries = tries;
   return best.filled;
