@@ -12,6 +12,8 @@
 
 namespace limber::internal {
 
+class StepPath;
+
 class SleepStage {
  public:
   explicit SleepStage(ConstraintStage& constraints) : constraints_(&constraints) {}
@@ -38,8 +40,8 @@ class SleepStage {
   void wake_all();
 
   /// After a step of h: counts who is at rest, and puts islands to sleep that have been for long enough.
-  /// @param events of the step
-  void update(const SleepOptions& options, double h, std::span<const ContactEvent> events);
+  /// @param path took the step. @param events of the step
+  void update(const SleepOptions& options, double h, const StepPath& path, std::span<const ContactEvent> events);
 
   /// Of as many bodies. Their groups and `constraints` know by themselves who sleeps.
   void save_state(std::size_t bodies, StateWriter& state) const;
@@ -65,7 +67,7 @@ class SleepStage {
       return std::tie(s.what, s.sleeper);
     }
   };
-  bool at_rest(Index body, const SleepOptions& options) const;
+  bool at_rest(Index body, const SleepOptions& options, const StepPath& path) const;
   void put_to_sleep(std::span<const Index> members);
 
   ConstraintStage* constraints_;

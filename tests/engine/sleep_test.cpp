@@ -46,6 +46,17 @@ TEST(Sleep, AStackFallsAsleepAndKeepsItsPlaceAndEnergyToTheBit) {
   }
 }
 
+/// Between the impulses of contacts the modes of the lowest fall and are thrown back: 3 cm/s, and no motion.
+TEST(Sleep, AStackWhoseSlowModesCarryMuchFallsAsleep) {
+  GroundedWorld scene({}, kSleepy);
+  const auto model = damped_box(6, 25.0);
+  std::vector<BodyId> boxes;
+  for (int i = 0; i < 6; ++i)
+    boxes.push_back(scene.world.add_body(model, {.pose = {{}, SleepingStack::place(*model, i)}}));
+  scene.step(300);
+  for (const BodyId b : boxes) EXPECT_TRUE(scene.world.is_asleep(b));
+}
+
 TEST(Sleep, NobodySleepsUnlessAskedTo) {
   GroundedWorld scene;
   const auto model = damped_box(0, 60.0);

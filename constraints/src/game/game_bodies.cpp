@@ -393,6 +393,20 @@ void GameBodies::end_step() {
   }
 }
 
+double GameBodies::modal_motion(std::int32_t at) const {
+  const GameBody& body = bodies_[static_cast<std::size_t>(at)];
+  if (body.modes == nullptr) return 0.0;
+  const Block8* q = &answers_[static_cast<std::size_t>(body.first + 1)];
+  const std::span<const double> rates = body.group->rates(body.slot);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < rates.size(); ++i) {
+    const double moving =
+        rates[i] - static_cast<double>(body.modes->rest_rates()[i]) * static_cast<double>(q[i / 8].v[i % 8]);
+    sum += moving * moving;
+  }
+  return sum;
+}
+
 bool GameBodies::all_finite() const {
   return std::ranges::all_of(bodies_, [](const GameBody& body) {
     const std::span<const double> z = body.group->amplitudes(body.slot), rates = body.group->rates(body.slot);

@@ -111,6 +111,8 @@ class GameBodies {
 
   /// Writes a force's or torque's part of a row in a frame's coordinates. @param linear, moment world
   void write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const;
+  /// Σ over its modes of (rate − that of rest under the forces of the last substep)², J.
+  double modal_motion(std::int32_t at) const;
   /// Whether all that moves has numbers.
   bool all_finite() const;
 
