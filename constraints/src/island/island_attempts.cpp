@@ -34,8 +34,8 @@ IslandReport IslandParts::guard(const StepPart& part, IslandReport done) {
   return done;
 }
 
-/// Where the rows did not come together and have left bodies bent, or loads have moved to contacts that have to be
-/// filled first: the free step, which has the energy that it began with.
+/// Where standing still is not enough, as rows that did not come together have left bodies bent: the free step, which
+/// has the energy that it began with.
 void IslandParts::refuse_impulses(IslandReport& report) {
   report.accepted = false;
   report.attempts[StepAttempt::kRefused] = 1;

@@ -23,16 +23,17 @@ struct RelativeMotion {
   double energy;
 };
 
-Vec3 center_at(const BodyGroup& group, Index slot, StepTime when) {
-  return frame_at(group, slot, when).pose() * group.frame_constants().center_of_mass;
+const RigidFrame& end_frame(const BodyGroup& group, Index slot) { return frame_at(group, slot, StepTime::kEnd); }
+
+Vec3 end_center(const BodyGroup& group, Index slot) {
+  return end_frame(group, slot).pose() * group.frame_constants().center_of_mass;
 }
 
-RelativeMotion relative_motion(const BodyGroup& group, Index slot, StepTime when, const CommonMotion& common) {
+RelativeMotion relative_motion(const BodyGroup& group, Index slot, const CommonMotion& common) {
   const FrameConstants& c = group.frame_constants();
-  const RigidFrame& frame = frame_at(group, slot, when);
+  const RigidFrame& frame = end_frame(group, slot);
   const Mat3 R = to_matrix(frame.pose().q);
-  const Vec3 carried_along =
-      common.velocity + common.angular_velocity.cross(center_at(group, slot, when) - common.center);
+  const Vec3 carried_along = common.velocity + common.angular_velocity.cross(end_center(group, slot) - common.center);
   const Vec3 velocity = frame.velocity() - carried_along;
   const Vec3 omega = frame.angular_velocity(c) - common.angular_velocity;
   const Vec3 angular_momentum = R * (c.inertia * (R.transpose() * omega));
@@ -101,7 +102,7 @@ IslandEnergy::Change IslandEnergy::guard(const IslandStep& step, bool give_back)
   if (!std::isfinite(gain)) return {.left = kUnbounded};
   if (excess == 0.0) return {};
   if (!step.mean && excess > kConstraintsTuning.energy.nonsense * std::max(at_hand, recovery_)) return {.left = excess};
-  const CommonMotion common = common_motion(step, StepTime::kEnd);
+  const CommonMotion common = common_motion(step);
   const double removed = remove_relative_energy(step.bodies, common, excess,
                                                 excess < patience ? kConstraintsTuning.energy.largest_change : 1.0);
   const double left = excess - removed;
@@ -109,7 +110,7 @@ IslandEnergy::Change IslandEnergy::guard(const IslandStep& step, bool give_back)
   return {removed, left > patience ? left : 0.0, std::max(0.0, left)};
 }
 
-CommonMotion IslandEnergy::common_motion(const IslandStep& step, StepTime when) const {
+CommonMotion IslandEnergy::common_motion(const IslandStep& step) const {
   if (!is_free(step)) return {};
   double mass = 0.0;
   Vec3 first = Vec3::Zero(), momentum = Vec3::Zero();
@@ -117,8 +118,8 @@ CommonMotion IslandEnergy::common_motion(const IslandStep& step, StepTime when) 
     const auto& [group, slot, pose] = step.bodies.body(local);
     const FrameConstants& c = group->frame_constants();
     mass += c.mass;
-    first += c.mass * center_at(*group, slot, when);
-    momentum += frame_at(*group, slot, when).linear_momentum(c);
+    first += c.mass * end_center(*group, slot);
+    momentum += end_frame(*group, slot).linear_momentum(c);
   }
   CommonMotion common{.center = first / mass, .velocity = momentum / mass};
   Mat3 inertia = Mat3::Zero();
@@ -126,9 +127,9 @@ CommonMotion IslandEnergy::common_motion(const IslandStep& step, StepTime when) 
   for (Index local = 0; local < step.bodies.count(); ++local) {
     const auto& [group, slot, pose] = step.bodies.body(local);
     const FrameConstants& c = group->frame_constants();
-    const RigidFrame& frame = frame_at(*group, slot, when);
+    const RigidFrame& frame = end_frame(*group, slot);
     const Mat3 R = to_matrix(frame.pose().q);
-    const Vec3 x = center_at(*group, slot, when) - common.center;
+    const Vec3 x = end_center(*group, slot) - common.center;
     inertia += R * c.inertia * R.transpose() + c.mass * (x.squaredNorm() * Mat3::Identity() - x * x.transpose());
     angular_momentum += frame.angular_momentum(c) + x.cross(c.mass * frame.velocity());
   }
@@ -143,7 +144,7 @@ double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const Co
   double kinetic = 0.0;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
-    kinetic += relative_motion(*group, slot, StepTime::kEnd, common).energy;
+    kinetic += relative_motion(*group, slot, common).energy;
     for (const double rate : group->predicted_rates(slot)) kinetic += 0.5 * rate * rate;
   }
   if (!(kinetic > 0.0)) return 0.0;
@@ -151,7 +152,7 @@ double IslandEnergy::remove_relative_energy(const IslandBodies& bodies, const Co
   const double slower = std::sqrt(1.0 - excess / kinetic) - 1.0;
   for (Index local = 0; local < bodies.count(); ++local) {
     const auto& [group, slot, pose] = bodies.body(local);
-    const RelativeMotion r = relative_motion(*group, slot, StepTime::kEnd, common);
+    const RelativeMotion r = relative_motion(*group, slot, common);
     const std::span<const double> rates = group->predicted_rates(slot);
     modal_.assign(rates.size(), 0.0);
     for (std::size_t i = 0; i < rates.size(); ++i) modal_[i] = slower * rates[i];

@@ -8,7 +8,7 @@
 
 namespace limber::internal {
 
-/// The motion that the whole island has: a rigid one if nothing holds it, else none.
+/// The motion that the whole island has at the step's end: a rigid one if nothing holds it, else none.
 struct CommonMotion {
   Vec3 center = Vec3::Zero(), velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
 };
@@ -30,7 +30,7 @@ class IslandEnergy {
     double surplus = 0.0;  // J, above what is allowed, for the next step
   };
   Change guard(const IslandStep& step, bool give_back);
-  CommonMotion common_motion(const IslandStep& step, StepTime when) const;
+  CommonMotion common_motion(const IslandStep& step) const;
   double remove_relative_energy(const IslandBodies& bodies, const CommonMotion& common, double excess,
                                 double largest_part);
 

@@ -16,7 +16,7 @@
 ///      velocity. Islands without contacts fall exactly,
 ///   3. predict bodies exactly under f, measure gaps and solve for Δf until gaps change by less than their tolerance,
 ///   4. guard the energy: where it would rise by more than the work of what drives the island, relative motion is
-///      slowed, or impulses are reduced.
+///      slowed, or all impulses are given up.
 /// Then the prediction is committed and the constraints are told their impulses (Constraint::accept).
 ///
 /// They solve 3 in rounds of a convex problem about the motion under the impulses at hand (the method of multipliers),

@@ -1,8 +1,9 @@
 /// @file limber/precompute/material_regions.h
 /// Materials inside a body: parts of it by shapes, by the nearest faces of its surface, or as fields on a grid.
 ///
-/// A tet takes the last of a list of regions that holds its centroid. Boundaries of regions thus run along faces of
-/// tets, up to a cell off; the report of a bake has volume and mass of each region.
+/// A tet takes the last of a list of regions that holds its centroid. Boundaries of regions run along faces of tets, up
+/// to a cell off where the mesh does not follow them (TetrahedralisationOptions::inner_surfaces). The report of a bake
+/// has volume and mass of each region.
 #pragma once
 
 #include <filesystem>
