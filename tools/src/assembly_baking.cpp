@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -206,7 +205,7 @@ void warn_of_open_slides(const JointsFile& joints, Warnings& warnings) {
     const bool slides = joint.joint.type == JointType::kPrismatic ||
                         (joint.joint.type == JointType::kCylindrical && joint.joint.pitch == 0.0);
     const Interval& way = joint.joint.limits.translation[0];
-    if (!slides || !joint.limits_known || (std::isfinite(way.low) && std::isfinite(way.high))) continue;
+    if (!slides || !joint.limits_known || way.bounded()) continue;
     const auto name = [&](Index i) { return "\"" + joints.components[static_cast<std::size_t>(i)].name + "\""; };
     names.push_back(name(joint.b) + " on " + name(joint.a));
   }

@@ -13,9 +13,7 @@ namespace {
 
 using Kind = MotionPath::Kind;
 
-double width(const Interval& i) { return i.high - i.low; }
 double middle(const Interval& i) { return 0.5 * (i.low + i.high); }
-bool bounded(const Interval& i) { return std::isfinite(i.low) && std::isfinite(i.high); }
 
 /// Bodies moved along their path.
 struct Posed {
@@ -42,9 +40,9 @@ class Engagement {
 
   CoupledMotion follow() {
     const std::optional<Interval> play = second_at(0.0, 0.0);
-    if (!play || !bounded(*play) || !(width(*play) > 0.0)) return {};
+    if (!play || !play->bounded() || !(play->width() > 0.0)) return {};
     const FreeMotion own = free_motion(first_.bodies, Posed(second_, middle(*play)).bodies, first_.path, options_, 0.0);
-    if (own.overlapping || !bounded(own.reachable)) return {};
+    if (own.overlapping || !own.reachable.bounded()) return {};
     out_.engaged = true;
     start_ = middle(*play);
     out_.reachable.high = march(1.0, own.reachable.high, first_.limits.high);
@@ -85,8 +83,8 @@ class Engagement {
     while (done < limit && !(turns && done >= 2.0 * kPi)) {
       const double h = std::min({step, longest(slope), limit - done}), foreseen = place + slope * sense * h;
       const std::optional<Interval> at = second_at(sense * (done + h), foreseen, near);
-      if (at && !bounded(*at)) return limit;  // apart
-      const double miss = at ? std::abs(middle(*at) - foreseen) / width(*at) : kInfinity;
+      if (at && !at->bounded()) return limit;  // apart
+      const double miss = at ? std::abs(middle(*at) - foreseen) / at->width() : kInfinity;
       if (!(miss < tuned.most_miss)) {
         step = 0.5 * h;
         if (!(step > least)) return done;
@@ -94,7 +92,7 @@ class Engagement {
       }
       done += h;
       slope = (middle(*at) - place) / (sense * h);
-      place = middle(*at), near = width(*at);
+      place = middle(*at), near = at->width();
       keep_ratios(sense * done, *at);
       if (miss < tuned.small_miss) step = 2.0 * h;
       if (place < second_.limits.low || place > second_.limits.high)
@@ -122,7 +120,7 @@ std::optional<FreeMotion> stopped_both_ways(const EngagedPart& moving, const Eng
   FreeMotionOptions reachable = options;
   reachable.reachable_only = true;
   FreeMotion m = free_motion(moving.bodies, standing.bodies, moving.path, reachable, 0.0);
-  if (m.overlapping || !bounded(m.reachable)) return {};
+  if (m.overlapping || !m.reachable.bounded()) return {};
   return m;
 }
 

@@ -9,8 +9,6 @@ namespace {
 using internal::degrees_text;
 using internal::number_text;
 
-double width(const Interval& interval) { return interval.high - interval.low; }
-
 /// The joint's frame with the axis of this number as x; the frame stays right-handed.
 JointFrame with_x(const JointFrame& frame, int axis) {
   JointFrame out{.origin = frame.origin, .axes = frame.axes};
@@ -30,8 +28,8 @@ JointSpec fixed_of(const JointSpec& joint) { return {.type = JointType::kFixed, 
 
 JointSpec without_narrow_freedoms(JointSpec joint, double min_rotation, double min_translation,
                                   std::vector<std::string>& reasons) {
-  const auto narrow_turn = [&](const Interval& i) { return width(i) < min_rotation; };
-  const auto narrow_slide = [&](const Interval& i) { return width(i) < min_translation; };
+  const auto narrow_turn = [&](const Interval& i) { return i.width() < min_rotation; };
+  const auto narrow_slide = [&](const Interval& i) { return i.width() < min_translation; };
   const auto becomes = [&](JointSpec other, const std::string& why) {
     reasons.push_back(why + ": the " + std::string(to_string(joint.type)) + " joint is " +
                       std::string(to_string(other.type)) + ".");
@@ -43,26 +41,26 @@ JointSpec without_narrow_freedoms(JointSpec joint, double min_rotation, double m
       break;
     case JointType::kRevolute:
       if (narrow_turn(l.rotation))
-        return becomes(fixed_of(joint), "It turns by " + degrees_text(width(l.rotation)) + " only");
+        return becomes(fixed_of(joint), "It turns by " + degrees_text(l.rotation.width()) + " only");
       break;
     case JointType::kPrismatic:
       if (narrow_slide(l.translation[0]))
-        return becomes(fixed_of(joint), "It slides by " + number_text(width(l.translation[0])) + " only");
+        return becomes(fixed_of(joint), "It slides by " + number_text(l.translation[0].width()) + " only");
       break;
     case JointType::kCylindrical: {
       if (joint.pitch != 0.0) {
         if (narrow_turn(l.rotation))
-          return becomes(fixed_of(joint), "It screws by " + degrees_text(width(l.rotation)) + " only");
+          return becomes(fixed_of(joint), "It screws by " + degrees_text(l.rotation.width()) + " only");
         break;
       }
       const bool turns = !narrow_turn(l.rotation), slides = !narrow_slide(l.translation[0]);
       if (!turns && !slides) return becomes(fixed_of(joint), "It neither turns nor slides");
       if (!slides)
         return becomes(one_freedom(joint, JointType::kRevolute, 0, l.rotation),
-                       "It slides by " + number_text(width(l.translation[0])) + " only");
+                       "It slides by " + number_text(l.translation[0].width()) + " only");
       if (!turns)
         return becomes(one_freedom(joint, JointType::kPrismatic, 0, l.translation[0]),
-                       "It turns by " + degrees_text(width(l.rotation)) + " only");
+                       "It turns by " + degrees_text(l.rotation.width()) + " only");
       break;
     }
     case JointType::kPlanar: {

@@ -388,7 +388,7 @@ class Couplings {
     if (m.low.body < 0 || m.high.body < 0) return false;
     const PathFrame frame(path(f));
     const double speed = frame.velocity(frame.to_path(m.high.point)).norm();
-    return speed * (m.reachable.high - m.reachable.low) <= tuning().ranges.engaged.play * size(f.joint);
+    return speed * m.reachable.width() <= tuning().ranges.engaged.play * size(f.joint);
   }
   bool may_engage(const Freedom& f) const {
     const JointType type = task_.joints[f.joint].joint.type;

@@ -87,7 +87,7 @@ bool TriangleCrossings::one_side(const MeetingFace& moving, const MeetingFace& f
   if (frame_.kind() == Kind::kTranslation) return false;
   const bool screw = frame_.kind() == Kind::kScrew;
   const double advanced = screw ? 0.5 * frame_.pitch() * (window.low + window.high) : 0.0;
-  const double more = screw ? 0.5 * std::abs(frame_.pitch()) * (window.high - window.low) : 0.0;
+  const double more = screw ? 0.5 * std::abs(frame_.pitch()) * window.width() : 0.0;
   const auto stays = [&](const MeetingFace& of, const MeetingFace& over, double sense) {
     double low = kInfinity, high = -kInfinity;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -239,12 +239,11 @@ bool cross_as_drawn(const OrbitFace& a, const OrbitFace& b, std::array<Vec3, 2>&
 void TriangleCrossings::find(const MeetingFace& moving, const MeetingFace& fixed, const Interval& window,
                              std::vector<TriangleCrossing>& out) {
   meetings_.clear();
-  const int parts =
-      frame_.kind() == Kind::kScrew ? std::max(1, static_cast<int>((window.high - window.low) / kPartOfTurn)) : 1;
+  const int parts = frame_.kind() == Kind::kScrew ? std::max(1, static_cast<int>(window.width() / kPartOfTurn)) : 1;
   for (int i = 0; i < parts; ++i) {
     Interval part = window;
-    if (parts > 1) part.low = window.low + i * (window.high - window.low) / parts;
-    if (parts > 1) part.high = window.low + (i + 1) * (window.high - window.low) / parts;
+    if (parts > 1) part.low = window.low + i * window.width() / parts;
+    if (parts > 1) part.high = window.low + (i + 1) * window.width() / parts;
     if (one_side(moving, fixed, part)) continue;
     corners_on_faces(moving, fixed, part);
     edges_on_edges(moving, fixed, part);

@@ -18,6 +18,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <string_view>
@@ -47,6 +48,8 @@ struct Interval {
   double high = std::numeric_limits<double>::infinity();
 
   bool open() const { return low == -std::numeric_limits<double>::infinity() && high == -low; }
+  bool bounded() const { return std::isfinite(low) && std::isfinite(high); }  ///< at both ends
+  double width() const { return high - low; }
   friend bool operator==(const Interval&, const Interval&) = default;
 };
 
