@@ -132,11 +132,7 @@ Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) 
 /// The boundary and the inner surfaces, between which cells must fit.
 SurfaceMesh all_surfaces(const Body& body) {
   SurfaceMesh all = body.boundary;
-  for (const SurfaceMesh& surface : body.inner) {
-    const auto first = static_cast<Index>(all.vertices.size());
-    all.vertices.insert(all.vertices.end(), surface.vertices.begin(), surface.vertices.end());
-    for (const Triangle& t : surface.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
+  for (const SurfaceMesh& surface : body.inner) append(surface, all);
   return all;
 }
 

@@ -61,14 +61,13 @@ std::vector<Vec3> spread_vertices(const SurfaceMesh& surface) {
   return taken;
 }
 
+SurfaceMesh turned(SurfaceMesh surface) {
+  for (Triangle& t : surface.triangles) std::swap(t[1], t[2]);
+  return surface;
+}
+
 void add_shell(const SurfaceShell& shell, bool outward, Body& body) {
-  const bool turn = (shell.volume > 0.0) != outward;
-  const auto base = static_cast<Index>(body.boundary.vertices.size());
-  body.boundary.vertices.insert(body.boundary.vertices.end(), shell.surface.vertices.begin(),
-                                shell.surface.vertices.end());
-  for (const Triangle& t : shell.surface.triangles)
-    body.boundary.triangles.push_back(turn ? Triangle{base + t[0], base + t[2], base + t[1]}
-                                           : Triangle{base + t[0], base + t[1], base + t[2]});
+  append((shell.volume > 0.0) == outward ? shell.surface : turned(shell.surface), body.boundary);
   const auto seeds = spread_vertices(shell.surface);
   body.seeds.insert(body.seeds.end(), seeds.begin(), seeds.end());
   body.volume += (outward ? 1.0 : -1.0) * std::abs(shell.volume);
@@ -76,10 +75,14 @@ void add_shell(const SurfaceShell& shell, bool outward, Body& body) {
 
 }  // namespace
 
+void append(const SurfaceMesh& part, SurfaceMesh& whole) {
+  const auto first = static_cast<Index>(whole.vertices.size());
+  whole.vertices.insert(whole.vertices.end(), part.vertices.begin(), part.vertices.end());
+  for (const Triangle& t : part.triangles) whole.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+}
+
 bool add_inner_surface(const SurfaceMesh& surface, Bodies& bodies) {
-  SurfaceMesh inward = surface;
-  if (enclosed_volume(inward) > 0.0)
-    for (Triangle& t : inward.triangles) std::swap(t[1], t[2]);
+  const SurfaceMesh inward = enclosed_volume(surface) > 0.0 ? turned(surface) : surface;
   std::vector<Body> cut = bodies.bodies;
   for (Body& body : cut) {
     SurfaceMesh inside = inward;

@@ -27,6 +27,9 @@ struct Bodies {
 /// is a cavity, a shell inside a cavity is a body again, whichever way their triangles run.
 Bodies split_into_bodies(const SurfaceMesh& surface);
 
+/// Adds the triangles of one surface to another.
+void append(const SurfaceMesh& part, SurfaceMesh& whole);
+
 /// Gives to each body the parts of a clean closed surface that lie in it. @return whether all bodies could be cut by
 /// it; if not, none has it
 bool add_inner_surface(const SurfaceMesh& surface, Bodies& bodies);

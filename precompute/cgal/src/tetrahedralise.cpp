@@ -314,9 +314,7 @@ Tetrahedralisation tetrahedralise(const SurfaceMesh& surface, const Tetrahedrali
 
 Index crossing_triangles(const SurfaceMesh& a, const SurfaceMesh& b) {
   SurfaceMesh both = a;
-  const auto first = static_cast<Index>(a.vertices.size());
-  both.vertices.insert(both.vertices.end(), b.vertices.begin(), b.vertices.end());
-  for (const Triangle& t : b.triangles) both.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  internal::append(b, both);
   return internal::find_crossings(both).triangle_pairs;
 }
 
