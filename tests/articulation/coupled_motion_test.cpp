@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "constants.h"
-#include "limber/articulation/range_of_motion.h"
-#include "parts.h"
+#include "sample_assembly.h"
 
 namespace limber {
 namespace {
@@ -17,6 +16,8 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
+using testing::component_of;
+using testing::joint_of;
 using testing::kPi;
 using Outline = std::vector<Eigen::Vector2d>;
 
@@ -78,35 +79,16 @@ SurfaceMesh rack(int teeth, double height) {
   return s;
 }
 
-Component component(const std::string& name, const SurfaceMesh& surface) {
-  Component c{.name = name, .faces = {}, .triangles = {}, .surface = surface};
-  c.closed = surface_quality(surface).closed_manifold();
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : surface.vertices) box.extend(p);
-  c.diagonal = box.diagonal().norm();
-  return c;
-}
-
-DetectedJoint joint(Index a, Index b, JointType type, const Vec3& x, const Vec3& origin) {
-  DetectedJoint j;
-  j.a = a, j.b = b;
-  j.joint.type = type;
-  j.joint.frame.origin = origin;
-  const auto [u, v] = parts::across(x);
-  j.joint.frame.axes << x, u, v;
-  return j;
-}
-
 TEST(CoupledMotion, GearsTurnEachOther) {
   constexpr int kFirst = 12, kSecond = 18;
   const Vec3 second(0.5 * (kFirst + kSecond), 0, 0);
   Assembly assembly;
-  assembly.components = {component("plate", shapes::box({-9, -9, -9}, {30, 9, -5})),
-                         component("small", prism(gear_outline(kFirst, 0.0), {0, 0}, {0, 0, 0}, 2)),
-                         component("large", prism(gear_outline(kSecond, kPi + kPi / kSecond), {0, 0}, second, 2))};
+  assembly.components = {component_of("plate", shapes::box({-9, -9, -9}, {30, 9, -5})),
+                         component_of("small", prism(gear_outline(kFirst, 0.0), {0, 0}, {0, 0, 0}, 2)),
+                         component_of("large", prism(gear_outline(kSecond, kPi + kPi / kSecond), {0, 0}, second, 2))};
   ASSERT_TRUE(assembly.components[1].closed);
-  const std::vector<DetectedJoint> joints{joint(0, 1, JointType::kRevolute, Vec3::UnitZ(), {0, 0, 0}),
-                                          joint(0, 2, JointType::kRevolute, Vec3::UnitZ(), second)};
+  const std::vector<DetectedJoint> joints{joint_of(0, 1, JointType::kRevolute, Vec3::UnitZ(), {0, 0, 0}),
+                                          joint_of(0, 2, JointType::kRevolute, Vec3::UnitZ(), second)};
   const std::vector<RangeOfMotion> ranges = ranges_of_motion(assembly, joints);
   for (std::size_t j = 0; j < 2; ++j) {
     EXPECT_EQ(ranges[j].joint.type, JointType::kRevolute);
@@ -136,10 +118,10 @@ TEST(CoupledMotion, APinionGoesAsFarAsItsRackDoes) {
   }
   Assembly assembly;
   assembly.components = {
-      component("rack", rack(9, 2)), component("plate", plate),
-      component("pinion", prism(gear_outline(kTeeth, -0.5 * kPi + kPi / kTeeth), {0, 0}, {0, kRadius, 0}, 2))};
-  const std::vector<DetectedJoint> joints{joint(0, 1, JointType::kPrismatic, Vec3::UnitX(), {0, 0, 0}),
-                                          joint(1, 2, JointType::kRevolute, Vec3::UnitZ(), {0, kRadius, 0})};
+      component_of("rack", rack(9, 2)), component_of("plate", plate),
+      component_of("pinion", prism(gear_outline(kTeeth, -0.5 * kPi + kPi / kTeeth), {0, 0}, {0, kRadius, 0}, 2))};
+  const std::vector<DetectedJoint> joints{joint_of(0, 1, JointType::kPrismatic, Vec3::UnitX(), {0, 0, 0}),
+                                          joint_of(1, 2, JointType::kRevolute, Vec3::UnitZ(), {0, kRadius, 0})};
   const std::vector<RangeOfMotion> ranges = ranges_of_motion(assembly, joints);
   ASSERT_EQ(ranges[1].joint.type, JointType::kRevolute);
   ASSERT_EQ(ranges[1].freedoms[0].coupled.size(), 1u);
@@ -159,11 +141,11 @@ TEST(CoupledMotion, APinionGoesAsFarAsItsRackDoes) {
 TEST(CoupledMotion, WedgesThatStopEachOtherOnOneSideAreNot) {
   // Two levers beside each other: either turns away, and neither is held within a play.
   Assembly assembly;
-  assembly.components = {component("plate", shapes::box({-9, -9, -9}, {30, 9, -5})),
-                         component("left", shapes::box({0, -0.5, -1}, {8, 0.5, 1})),
-                         component("right", shapes::box({7, 0.6, -1}, {15, 1.6, 1}))};
-  const std::vector<DetectedJoint> joints{joint(0, 1, JointType::kRevolute, Vec3::UnitZ(), {0, 0, 0}),
-                                          joint(0, 2, JointType::kRevolute, Vec3::UnitZ(), {15, 1.1, 0})};
+  assembly.components = {component_of("plate", shapes::box({-9, -9, -9}, {30, 9, -5})),
+                         component_of("left", shapes::box({0, -0.5, -1}, {8, 0.5, 1})),
+                         component_of("right", shapes::box({7, 0.6, -1}, {15, 1.6, 1}))};
+  const std::vector<DetectedJoint> joints{joint_of(0, 1, JointType::kRevolute, Vec3::UnitZ(), {0, 0, 0}),
+                                          joint_of(0, 2, JointType::kRevolute, Vec3::UnitZ(), {15, 1.1, 0})};
   for (const RangeOfMotion& range : ranges_of_motion(assembly, joints))
     EXPECT_THAT(range.freedoms[0].coupled, IsEmpty());
 }

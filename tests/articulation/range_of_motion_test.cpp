@@ -8,7 +8,7 @@
 
 #include "constants.h"
 #include "limber/core/error.h"
-#include "parts.h"
+#include "sample_assembly.h"
 
 namespace limber {
 namespace {
@@ -18,6 +18,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
+using testing::component_of;
+using testing::joint_of;
 using testing::kDegree;
 using testing::kInfinity;
 using testing::kPi;
@@ -28,29 +30,13 @@ constexpr double kLength = 1e-3;
 
 Assembly assembly_of(const std::vector<SurfaceMesh>& parts) {
   Assembly assembly;
-  Vec3 low = Vec3::Constant(kInfinity), high = -low;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    Component c{.name = "part " + std::to_string(i + 1), .faces = {}, .triangles = {}, .surface = parts[i]};
-    c.closed = surface_quality(c.surface).closed_manifold();
-    Vec3 l = Vec3::Constant(kInfinity), h = -l;
-    for (const Vec3& p : c.surface.vertices) l = l.cwiseMin(p), h = h.cwiseMax(p);
-    c.diagonal = (h - l).norm();
-    low = low.cwiseMin(l), high = high.cwiseMax(h);
-    assembly.components.push_back(std::move(c));
+  Eigen::AlignedBox3d box;
+  for (const SurfaceMesh& part : parts) {
+    assembly.components.push_back(component_of("part " + std::to_string(assembly.components.size() + 1), part));
+    for (const Vec3& p : part.vertices) box.extend(p);
   }
-  assembly.diagonal = (high - low).norm();
+  assembly.diagonal = box.diagonal().norm();
   return assembly;
-}
-
-DetectedJoint joint_of(Index a, Index b, JointType type, const Vec3& x = Vec3::UnitX(),
-                       const Vec3& origin = Vec3::Zero()) {
-  DetectedJoint j;
-  j.a = a, j.b = b;
-  j.joint.type = type;
-  j.joint.frame.origin = origin;
-  const auto [u, v] = parts::across(x);
-  j.joint.frame.axes << x, u, v;
-  return j;
 }
 
 std::vector<DetectedJoint> links(const std::vector<std::pair<Index, Index>>& pairs) {

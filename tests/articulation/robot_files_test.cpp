@@ -15,7 +15,7 @@
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/mesh/read_mesh.h"
-#include "parts.h"
+#include "sample_assembly.h"
 
 namespace limber {
 namespace {
@@ -31,9 +31,7 @@ constexpr double kRoundOff = 1e-9;
 constexpr double kFloat = 1e-5;
 
 Component box_component(const std::string& name, const Vec3& low, const Vec3& high) {
-  Component c{.name = name, .faces = {}, .triangles = {}, .surface = shapes::box(low, high), .closed = true};
-  c.diagonal = (high - low).norm();
-  return c;
+  return testing::component_of(name, shapes::box(low, high));
 }
 
 DetectedJoint placed_joint(Index a, Index b, JointType type, const Vec3& origin, const Vec3& rotation) {
