@@ -46,7 +46,7 @@ TEST(Sleep, AStackFallsAsleepAndKeepsItsPlaceAndEnergyToTheBit) {
   }
 }
 
-/// Between the impulses of contacts the modes of the lowest fall and are thrown back: 3 cm/s, and no motion.
+/// Its lowest modes pass through rest at 13 mm/s, between the impulses of two substeps.
 TEST(Sleep, AStackWhoseSlowModesCarryMuchFallsAsleep) {
   GroundedWorld scene({}, kSleepy);
   const auto model = damped_box(6, 25.0);
