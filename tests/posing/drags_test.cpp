@@ -19,11 +19,14 @@ constexpr double kJoint = 1e-6;                // of the size, rad
 constexpr double kLimitAngle = 0.1 * kDegree;  // how far beyond a limit a frame may be
 constexpr double kLimitLength = 1e-3;          // of the size
 
+/// Small steps stay on their branch (PosingOptions::starts).
+const PosingOptions kFollow{.starts = 0};
+
 /// The first part stays; parts between the first and the last are soft if asked; the last is held by its furthest
 /// point.
 struct Dragged {
   explicit Dragged(const std::string& name, bool soft = false, double cell = 0.0)
-      : session(soft ? assembly_model(name) : rigid_assembly(name)),
+      : session(soft ? assembly_model(name) : rigid_assembly(name), kFollow),
         size(size_of(session.model())),
         last(static_cast<Index>(session.model().parts.size()) - 1) {
     session.set_pinned(0, true);
@@ -36,7 +39,7 @@ struct Dragged {
 
   /// Nothing stays but by what the test adds.
   explicit Dragged(JointedModel model)
-      : session(std::move(model)),
+      : session(std::move(model), kFollow),
         size(size_of(session.model())),
         last(static_cast<Index>(session.model().parts.size()) - 1) {
     grip = furthest_point(session.model(), last, furthest_point(session.model(), 0, Vec3(10, 0, 0)));
