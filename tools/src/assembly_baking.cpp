@@ -188,6 +188,17 @@ std::string listed(const std::vector<std::string>& names) {
   return text;
 }
 
+/// @param option that names it @throws Error if the file has no such component
+template <class Error>
+void check_name(const std::string& path, const Assembly& assembly, const std::string& option, const std::string& name) {
+  std::vector<std::string> names;
+  for (const Component& part : assembly.components) {
+    if (part.name == name) return;
+    names.push_back("\"" + part.name + "\"");
+  }
+  throw Error(option + ": \"" + path + "\" has no component \"" + name + "\", expected one of " + listed(names));
+}
+
 void warn_of_fallers(const JointsFile& joints, const std::vector<std::string>& ground, Warnings& warnings) {
   std::vector<std::string> names;
   for (const std::string& name : fallers(joints, ground)) names.push_back("\"" + name + "\"");
@@ -285,12 +296,10 @@ BakedAssembly bake_assembly(Program& program, const std::string& path, const Ass
     program.warnings().push_back(
         fmt::format("\"{}\": {} triangles have two corners at one place and have been dropped", path, dropped));
   for (const std::string& name : options.rigid)
-    if (name != "*") component_named(joined.assembly, name);
-  for (const std::string& name : options.ground) component_named(joined.assembly, name);
+    if (name != "*") check_name<InvalidArgument>(path, joined.assembly, "--rigid", name);
+  for (const std::string& name : options.ground) check_name<InvalidArgument>(path, joined.assembly, "--ground", name);
   for (const auto& [name, material] : bake_options.materials)
-    if (name != "*" && std::ranges::none_of(joined.assembly.components,
-                                            [&name = name](const Component& part) { return part.name == name; }))
-      throw InputError("materials: there is no component \"" + name + "\"");
+    if (name != "*") check_name<InputError>(path, joined.assembly, "--materials", name);
   joined.joints.components.clear();  // in the assembly's order
   for (const Component& part : joined.assembly.components)
     joined.joints.components.push_back({.name = part.name, .faces = part.faces});
