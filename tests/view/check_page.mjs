@@ -265,11 +265,17 @@ async function waitsWhereAsked() {
   await page.close();
 }
 
+/** The page knows of another size with the next frame that it draws, and not before: a frame may take long. */
+async function resized(page, size) {
+  await page.setViewportSize(size);
+  await page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+}
+
 /** On a phone: folded sheets below the picture, controls for fingers, nothing cut off. */
 async function fitsAPhone(page) {
   const size = page.viewportSize(), folded = picture?.replace('.png', '.phone.png'), unfolded = picture?.replace('.png', '.phone_controls.png');
   await fromTheStart(page);
-  await page.setViewportSize({ width: 400, height: 800 });
+  await resized(page, { width: 400, height: 800 });
   await page.keyboard.press('Home');
   const look = () => page.evaluate(() => {
     const panel = document.getElementById('panel'), seen = (x) => x.getClientRects().length > 0;
@@ -293,7 +299,7 @@ async function fitsAPhone(page) {
     check((await page.locator('#panel .sheet:visible').count()) === 1, 'one sheet at a time');
   }
   if (unfolded) await page.screenshot({ path: unfolded });
-  await page.setViewportSize(size);
+  await resized(page, size);
 }
 
 /** A download that broke off says so. */
