@@ -8,6 +8,7 @@
 
 #include "block_model.h"
 #include "limber/core/error.h"
+#include "limber/scene/blows.h"
 #include "limber/sound/contact_time.h"
 #include "limber/sound/radiation.h"
 #include "limber/sound/synthesizer.h"
@@ -17,23 +18,7 @@ namespace {
 
 constexpr double kRate = 48e3;
 
-/// A block whose bending modes one hears at 300 (i+1)² Hz; without modes that move it.
-std::map<std::string, Asset> sounding_block() {
-  Asset asset = testing::block_asset(0);
-  const ModalSurface& surface = asset.bodies[0]->collision();
-  SoundModes modes{
-      .eigenvalues = {}, .decays = {}, .shapes = {}, .vertices = surface.vertices(), .contact_modulus = 1e7};
-  for (Index m = 0; m < 3; ++m) {
-    modes.eigenvalues.push_back(std::pow(2.0 * std::numbers::pi * 300.0 * (m + 1) * (m + 1), 2));
-    modes.decays.push_back(6.0 * (m + 1));
-    for (const Vec3f& r : surface.rest) {
-      const Vec3f w = testing::block_shape(r.cast<double>(), m).cast<float>();
-      modes.shapes.insert(modes.shapes.end(), {w.x(), w.y(), w.z()});
-    }
-  }
-  asset.sounds = {std::make_shared<SoundModes>(modes)};
-  return {{"block", asset}};
-}
+std::map<std::string, Asset> sounding_block() { return {{"block", testing::sounding_block_asset(0)}}; }
 
 Scene heard_scene(const std::string& inside) {
   return parse_scene(R"({"assets": {"block": "block.glb"}, )" + inside + "}", "\"test.json\"", "");
@@ -122,6 +107,27 @@ TEST(Soundtrack, BodiesWithoutASoundAreToldAndSilent) {
   EXPECT_EQ(track.silent_bodies, 1);
   EXPECT_EQ(track.blows, 0);
   EXPECT_EQ(track.loudest, 0.0);
+}
+
+/// By the synthesizer itself, at every vertex; along y, as all modes bend.
+TEST(Soundtrack, NoBlowIsLouderThanTheLargestPressureAndSomeAreNearlySo) {
+  const Asset asset = testing::sounding_block_asset(0);
+  const SoundingBody body(asset.sounds[0], asset.bodies[0]->collision());
+  for (const double contact_time : {1e-4, 1e-3, 2e-3}) {
+    double loudest = 0.0;
+    for (Index v = 0; v < body.modes().vertices; ++v) {
+      Synthesizer synthesizer({.sample_rate = kRate, .channels = 1});
+      synthesizer.add_body(std::make_shared<ModalSound>(body.modes(), body.gains(), kRate));
+      synthesizer.strike({.at = {.vertices = {v, v, v}}, .impulse = {0, 1, 0}, .contact_time = contact_time});
+      std::vector<float> samples(2048);
+      synthesizer.render(samples);
+      for (auto n = static_cast<std::size_t>(contact_time * kRate) + 1; n < samples.size(); ++n)
+        loudest = std::max(loudest, std::abs(static_cast<double>(samples[n])));
+    }
+    constexpr double kSingle = 1e-6;
+    EXPECT_LE(loudest, (1.0 + kSingle) * body.largest_pressure(contact_time)) << contact_time;
+    EXPECT_GE(loudest, 0.7 * body.largest_pressure(contact_time)) << contact_time;
+  }
 }
 
 TEST(Soundtrack, MicrophonesAndContactTimesOutOfRangeAreToldWithTheirPlace) {

@@ -11,6 +11,7 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "limber/model/asset.h"
 #include "limber/model/modal_model.h"
@@ -84,6 +85,25 @@ inline Asset block_asset(Index modes, const std::string& name = "block") {
   asset.bodies = {block_model(modes, name)};
   asset.provenance.tool = "test";
   asset.provenance.input = "block";
+  return asset;
+}
+
+/// A block whose three bending modes one hears at 300 (i+1)² Hz; `modes` move it.
+inline Asset sounding_block_asset(Index modes) {
+  Asset asset = block_asset(modes);
+  const ModalSurface& surface = asset.bodies[0]->collision();
+  auto sound = std::make_shared<SoundModes>();
+  sound->vertices = surface.vertices();
+  sound->contact_modulus = 1e7;
+  for (Index m = 0; m < 3; ++m) {
+    sound->eigenvalues.push_back(std::pow(2.0 * std::numbers::pi * 300.0 * (m + 1) * (m + 1), 2));
+    sound->decays.push_back(6.0 * (m + 1));
+    for (const Vec3f& r : surface.rest) {
+      const Vec3f w = block_shape(r.cast<double>(), m).cast<float>();
+      sound->shapes.insert(sound->shapes.end(), {w.x(), w.y(), w.z()});
+    }
+  }
+  asset.sounds = {std::move(sound)};
   return asset;
 }
 

@@ -403,6 +403,8 @@ SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& 
       models.manifest.push_back(std::move(manifest));
     }
     models.of_body.push_back(model);
+    const std::vector<std::shared_ptr<const SoundModes>>& sounds = assets.at(body.asset).sounds;
+    models.sound_of_body.push_back(key.second < sounds.size() ? sounds[key.second] : nullptr);
   }
   ShapeLoader shapes;
   for (const SceneBody& body : scene.bodies)

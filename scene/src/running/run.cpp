@@ -41,25 +41,6 @@ double limit_excess(const JointSpec& joint, const std::array<double, 3>& q) {
   return 0.0;
 }
 
-/// 1/m that a contact feels of a body, kg⁻¹. @param r from the body's origin, world
-double inverse_mass(const ModalModelData& body, const RigidTransform& pose, const Vec3& r, const Vec3& normal) {
-  const Vec3 moment = pose.q.conjugate() * Vec3(r.cross(normal));
-  switch (body.motion) {
-    case FrameMotion::kFree:
-      return 1.0 / body.mass + moment.dot(body.inertia.ldlt().solve(moment));
-    case FrameMotion::kPoint:
-      return moment.dot(body.inertia.ldlt().solve(moment));
-    case FrameMotion::kLine:
-      return std::pow(moment.dot(body.line_axis), 2) / body.line_axis.dot(body.inertia * body.line_axis);
-    case FrameMotion::kKinematic:
-      break;
-  }
-  return 0.0;
-}
-
-/// 1/R of a body where it is touched, 1/m.
-double inverse_radius(const ModalModelData& body) { return std::cbrt(4.0 * std::numbers::pi / 3.0 / body.volume); }
-
 class Run {
  public:
   Run(const Scene& scene, const SceneModels& models, const RunOptions& options)
@@ -84,7 +65,7 @@ class Run {
       note_joints();
       note_contacts(n);
       note_sensors(n);
-      if (options_.keep_blows) note_blows(n);
+      if (options_.keep_blows) list_blows(scene_, player_, ids_, number_of_, result_.trajectory.blows);
       note_sleepers();
       if (options_.reconstruct_every_step) reconstruct_all();
       if ((n + 1) % stride_ == 0 || n + 1 == steps_) keep_key(n + 1);
@@ -178,53 +159,6 @@ class Run {
                                                   .sensor = number_of_[e.sensor.index],
                                                   .body = number_of_[e.body.index],
                                                   .began = e.began});
-  }
-
-  void note_blows(std::int64_t n) {
-    for (const LoadReport& report : player_.strikes()) {
-      if (report.body.empty() || report.step != n) continue;  // not yet, or long ago
-      const Strike& strike = scene_.strikes[report.load];
-      BlowRecord blow = blow_on(report.number, report.point, strike.impulse);
-      if (strike.axes == Axes::kBody) blow.impulse = strike.impulse;
-      blow.time = static_cast<double>(n) * scene_.step + report.delay;
-      blow.contact_time = strike.contact_time;
-      result_.trajectory.blows.push_back(blow);
-    }
-    for (const ContactEvent& e : world_.contact_events())
-      if (e.phase == ContactPhase::kBegun && e.approach > 0.0) note_collision(n, e);
-  }
-
-  /// Of both bodies, as far as they move.
-  void note_collision(std::int64_t n, const ContactEvent& e) {
-    const std::size_t a = number_of_[static_cast<std::size_t>(e.a)], b = number_of_[static_cast<std::size_t>(e.b)];
-    double mass = 0.0, radius = 0.0;  // reciprocals
-    for (const std::size_t body : {a, b}) {
-      if (body >= ids_.size()) continue;
-      const ModalModelData& data = models_.of_body[body]->data();
-      const RigidTransform pose = world_.interpolated_pose(ids_[body], 0.0);
-      mass += inverse_mass(data, pose, e.position - pose.p, e.normal);
-      radius += inverse_radius(data);
-    }
-    if (mass == 0.0) return;
-    for (const auto& [body, other, impulse] : {std::tuple(a, b, e.impulse), std::tuple(b, a, Vec3(-e.impulse))}) {
-      if (body >= ids_.size()) continue;
-      BlowRecord blow = blow_on(body, e.position, impulse);
-      blow.time = static_cast<double>(n) * scene_.step;
-      blow.other = other;
-      blow.mass = 1.0 / mass, blow.radius = 1.0 / radius, blow.approach = e.approach;
-      result_.trajectory.blows.push_back(blow);
-    }
-  }
-
-  /// Where the body was at the step's start.
-  BlowRecord blow_on(std::size_t body, const Vec3& position, const Vec3& impulse) const {
-    const RigidTransform pose = world_.interpolated_pose(ids_[body], 0.0);
-    BlowRecord blow;
-    blow.body = body;
-    blow.position = position;
-    blow.point = pose.inverse() * position;
-    blow.impulse = pose.q.conjugate() * impulse;
-    return blow;
   }
 
   void note_sleepers() {

@@ -2,47 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <optional>
 #include <utility>
 
 #include "limber/core/error.h"
-#include "limber/mesh/closest_point.h"
-#include "limber/sound/contact_time.h"
-#include "limber/sound/radiation.h"
+#include "limber/scene/blows.h"
 #include "limber/sound/synthesizer.h"
 
 namespace limber {
 namespace {
-
-/// A kind of body: what it sounds like, and where it is struck.
-struct SoundingModel {
-  std::shared_ptr<const ModalSound> sound;
-  const ModalSurface* surface = nullptr;
-  double radius = 0.0;  // of the ball of its surface's area, m
-
-  StruckPoint nearest(const Vec3& point) const {
-    StruckPoint best;
-    double least = std::numeric_limits<double>::infinity();
-    for (const Triangle& t : surface->triangles) {
-      const auto corner = [&](Index v) -> Vec3 { return surface->rest[static_cast<std::size_t>(v)].cast<double>(); };
-      const SurfaceFoot foot = closest_on_triangle(point, {corner(t[0]), corner(t[1]), corner(t[2])});
-      if (const double distance = (foot.point - point).squaredNorm(); distance < least)
-        least = distance, best = {.vertices = t, .weights = foot.weight};
-    }
-    return best;
-  }
-};
-
-double area_of(const ModalSurface& surface) {
-  double area = 0.0;
-  for (const Triangle& t : surface.triangles) {
-    const auto corner = [&](Index v) -> Vec3 { return surface.rest[static_cast<std::size_t>(v)].cast<double>(); };
-    area += 0.5 * (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).norm();
-  }
-  return area;
-}
 
 std::size_t part_of(const SceneBody& body, const Asset& asset) {
   const auto refuse_part = [&]() -> std::size_t {
@@ -75,18 +43,18 @@ class Orchestra {
   void strike(const BlowRecord& record) {
     const Index body = number_[record.body];
     if (body < 0) return;
-    const SoundingModel& model = *model_[record.body];
+    const SoundingBody& model = *model_[record.body];
     const double start = record.time * rate_;
     render_until(static_cast<std::int64_t>(start));
     std::vector<double> gains;
     for (const Vec3& microphone : scene_.microphones)
-      gains.push_back(1.0 / std::max((microphone - record.position).norm(), model.radius));
+      gains.push_back(1.0 / std::max((microphone - record.position).norm(), model.radius()));
     synthesizer_.set_gains(body, gains);
     const double delay = std::max(0.0, start - static_cast<double>(synthesizer_.samples())) / rate_;
     if (!synthesizer_.strike({.body = body,
                               .at = model.nearest(record.point),
                               .impulse = record.impulse,
-                              .contact_time = contact_time_of(record),
+                              .contact_time = duration_of(record, &model, model_of(record.other)),
                               .delay = delay}))
       throw ComputationError("make_soundtrack: more than " + std::to_string(kMostBlows) + " contacts at a time");
     ++blows_;
@@ -117,38 +85,28 @@ class Orchestra {
       return;
     }
     auto [entry, fresh] = made_.try_emplace(std::pair(body.asset, part));
-    SoundingModel& model = entry->second;
+    Kind& kind = entry->second;
     if (fresh) {
-      model.surface = &asset->second.bodies[part]->collision();
-      model.radius = std::sqrt(area_of(*model.surface) / (4.0 * std::numbers::pi));
-      model.sound = std::make_shared<ModalSound>(
-          *modes, monopole_gains(*modes, model.surface->rest, model.surface->triangles), rate_);
+      kind.body.emplace(asset->second.sounds[part], asset->second.bodies[part]->collision());
+      kind.sound = std::make_shared<ModalSound>(*modes, kind.body->gains(), rate_);
     }
-    number_.push_back(synthesizer_.add_body(model.sound));
-    model_.push_back(&model);
+    number_.push_back(synthesizer_.add_body(kind.sound));
+    model_.push_back(&*kind.body);
   }
 
-  double modulus_of(std::size_t body) const {
-    return body < model_.size() && model_[body] ? model_[body]->sound->contact_modulus() : kUnbounded;
-  }
+  const SoundingBody* model_of(std::size_t body) const { return body < model_.size() ? model_[body] : nullptr; }
 
-  /// What is softer or harder than the range has its ends.
-  double contact_time_of(const BlowRecord& record) const {
-    constexpr double kShortest = 1e-6, kLongest = 10.0;
-    if (record.other == BlowRecord::kNobody) return record.contact_time;
-    const double a = modulus_of(record.body), b = modulus_of(record.other);
-    if (std::isinf(a) && std::isinf(b)) return kShortest;
-    const double tau =
-        contact_time({.mass = record.mass, .radius = record.radius, .modulus = a}, {.modulus = b}, record.approach);
-    return std::clamp(tau, kShortest, kLongest);
-  }
+  struct Kind {
+    std::optional<SoundingBody> body;
+    std::shared_ptr<const ModalSound> sound;
+  };
 
   const Scene& scene_;
   Synthesizer synthesizer_;
   double rate_;
-  std::map<std::pair<std::string, std::size_t>, SoundingModel> made_;
-  std::vector<Index> number_;                // in the synthesizer, per Scene::bodies; −1: silent
-  std::vector<const SoundingModel*> model_;  // the same; null: silent
+  std::map<std::pair<std::string, std::size_t>, Kind> made_;
+  std::vector<Index> number_;               // in the synthesizer, per Scene::bodies; −1: silent
+  std::vector<const SoundingBody*> model_;  // the same; null: silent
   std::vector<float> samples_;
   std::int64_t blows_ = 0;
 };

@@ -11,6 +11,7 @@
 
 #include "limber/core/jobs.h"
 #include "limber/engine/world.h"
+#include "limber/scene/blows.h"
 #include "limber/scene/scene_file.h"
 #include "limber/scene/scene_model.h"
 #include "limber/scene/scene_player.h"
@@ -70,20 +71,6 @@ struct SensorRecord {
   std::size_t sensor = 0;  ///< in Trajectory::sensors
   std::size_t body = 0;    ///< as those of ContactRecord
   bool began = true;       ///< false: left
-};
-
-/// Something that struck a body: a strike of the scene, or a contact that began with an approach.
-struct BlowRecord {
-  static constexpr std::size_t kNobody = ~std::size_t{0};
-  double time = 0.0;             ///< s: of the strike, or of the start of the step in which the contact began
-  std::size_t body = 0;          ///< which was struck, of Trajectory::bodies
-  std::size_t other = kNobody;   ///< which struck it, as ContactRecord numbers them; kNobody: a strike of the scene
-  Vec3 position = Vec3::Zero();  ///< world, m
-  Vec3 point = Vec3::Zero(), impulse = Vec3::Zero();  ///< the place and the impulse on the body, body frame, m and N·s
-  double contact_time = 0.0;                          ///< of a strike of the scene, s
-  /// Of a contact, of both bodies together as contact_time.h has them: m, kg, R, m, and v, m/s. A body without a radius
-  /// of its own (ContactSide) counts as a ball of its volume, a static as flat.
-  double mass = kUnbounded, radius = kUnbounded, approach = 0.0;
 };
 
 struct Trajectory {

@@ -65,12 +65,13 @@ struct ModelManifest {
 /// The models of a scene's bodies, one per asset body in use, and the shapes of its bodies, statics and
 /// sensors, one per file.
 struct SceneModels {
-  std::vector<std::shared_ptr<const ModalModel>> of_body;     ///< per Scene::bodies
-  std::vector<std::shared_ptr<const Shape>> shape_of_body;    ///< the same; null: none
-  std::vector<std::shared_ptr<const Shape>> shape_of_static;  ///< per Scene::statics
-  std::vector<std::shared_ptr<const Shape>> shape_of_sensor;  ///< per Scene::sensors
-  std::vector<ModelManifest> manifest;                        ///< in order of first use
-  Warnings warnings;                                          ///< of the files of shapes
+  std::vector<std::shared_ptr<const ModalModel>> of_body;        ///< per Scene::bodies
+  std::vector<std::shared_ptr<const Shape>> shape_of_body;       ///< the same; null: none
+  std::vector<std::shared_ptr<const SoundModes>> sound_of_body;  ///< the same; null: one does not hear it
+  std::vector<std::shared_ptr<const Shape>> shape_of_static;     ///< per Scene::statics
+  std::vector<std::shared_ptr<const Shape>> shape_of_sensor;     ///< per Scene::sensors
+  std::vector<ModelManifest> manifest;                           ///< in order of first use
+  Warnings warnings;                                             ///< of the files of shapes
 };
 
 /// Reads the assets and the files of shapes, and makes the models. @throws InputError (file, or a body's part that the
