@@ -35,8 +35,8 @@ ExternalProject_Add(limber_page_engine
     -DCMAKE_TOOLCHAIN_FILE=${emscripten_root}/cmake/Modules/Platform/Emscripten.cmake -DCMAKE_BUILD_TYPE=Release
     "-DCMAKE_CXX_FLAGS_RELEASE=-O3 -DNDEBUG" -DEigen3_DIR=${Eigen3_DIR} -DLIMBER_PAGE_HEADERS=${page_headers}
     -DLIMBER_WARNINGS_AS_ERRORS=OFF
-  BUILD_COMMAND ${with_node_path} ${CMAKE_COMMAND} --build <BINARY_DIR> --target page_engine
-  BUILD_BYPRODUCTS ${page_engine}/page_engine.mjs ${page_engine}/page_engine.wasm
+  BUILD_COMMAND ${with_node_path} ${CMAKE_COMMAND} --build <BINARY_DIR> --target page_engine page_sound
+  BUILD_BYPRODUCTS ${page_engine}/page_engine.mjs ${page_engine}/page_engine.wasm ${page_engine}/page_sound.wasm
   INSTALL_COMMAND ""
   BUILD_ALWAYS ON
   USES_TERMINAL_BUILD ON)
@@ -61,6 +61,7 @@ add_custom_command(OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/empty_page.cpp
   COMMAND ${LIMBER_NODE} build.mjs ${page_engine} ${CMAKE_CURRENT_BINARY_DIR}/empty_page.cpp
   WORKING_DIRECTORY ${page_web}
   DEPENDS ${page_copies} ${page_web}/node_modules/.installed ${page_engine}/page_engine.mjs ${page_engine}/page_engine.wasm
+          ${page_engine}/page_sound.wasm
   COMMENT "The page without a scene")
 add_library(limber_page STATIC ${CMAKE_CURRENT_BINARY_DIR}/empty_page.cpp)
 add_dependencies(limber_page limber_page_engine)

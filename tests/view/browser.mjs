@@ -52,6 +52,7 @@ export async function open(path, holds = plays, fragment = '') {
 export async function isSafe(page, path) {
   const policy = await page.evaluate(() => document.querySelector('meta[http-equiv="Content-Security-Policy"]').content);
   check(/default-src 'none'/.test(policy) && !/unsafe-inline|unsafe-eval|https?:|\*/.test(policy.replace("'wasm-unsafe-eval'", '')), `the policy is strict: ${policy}`);
+  check(/script-src[^;]*'strict-dynamic'/.test(policy) && !/script-src[^;]*(data|blob):/.test(policy), 'markup brings no scripts');
   probing = true;
   const refused = await page.evaluate(() => new Promise((done) => setTimeout(() => {  // as the page's own script, not as the browser's tools
     try {

@@ -40,6 +40,7 @@ async function playsByItself(page) {
   const taken = () => page.evaluate(() => globalThis.limber.engine.steps()), before = await taken();
   check(await until(async () => (await taken()) > before), 'it goes on by itself');
   await isSafe(page, file);
+  check((await page.locator('#panel button:text-is("Sound")').count()) === 0, 'a scene that one cannot hear has no button for it');
 }
 
 /** As it begins, at rest: whatever number of steps it has played. */

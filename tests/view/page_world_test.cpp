@@ -37,6 +37,7 @@ class PageWorldTest : public ::testing::Test {
   }
   ~PageWorldTest() override { std::filesystem::remove_all(folder_); }
   std::filesystem::path scene() const { return folder_ / "falls.json"; }
+  void make_it_sound() const { write_asset(folder_ / "block.glb", testing::sounding_block_asset(kModes)); }
 
  private:
   const std::filesystem::path folder_ =
@@ -187,6 +188,45 @@ TEST_F(PageWorldTest, PokesPushPinsHoldAndGravityTurns) {
   page.unpin();
   step(page, 100);
   EXPECT_GT(page.frame()[2], 1.5f) << "it rises";
+}
+
+TEST_F(PageWorldTest, BlowsAreNotedWhileSomebodyListens) {
+  EXPECT_EQ(PageWorld(scene()).models()[0].sound, nullptr);
+  EXPECT_THROW(PageWorld(scene()).sounding(0), InvalidArgument);
+  make_it_sound();
+  PageWorld page(scene());
+  ASSERT_NE(page.models()[0].sound, nullptr);
+  page.poke(page.cast_ray({0, 10, 0.8}, {0, -1, 0}), {0, -3, 0});
+  step(page, 60);
+  EXPECT_TRUE(page.take_blows().empty());
+  page.restart(page.settings());
+  page.listen(true);
+  page.poke(page.cast_ray({0.25, 10, 0.9}, {0, -1, 0}), {0, -3, 0}, 2e-4);
+  const std::span<const double> poke = page.take_blows();
+  ASSERT_EQ(poke.size(), PageWorld::kBlowNumbers);
+  EXPECT_EQ(poke[0], 0.0);
+  const std::vector<Vec3f>& rest = page.world().model({0, 1}).collision().rest;
+  Vec3 struck = Vec3::Zero();
+  for (std::size_t i = 1; i <= 3; ++i) struck += poke[3 + i] * rest[static_cast<std::size_t>(poke[i])].cast<double>();
+  EXPECT_LT((struck - Vec3(0.25, 0.5, 0.1)).norm(), 1e-6);
+  EXPECT_LT((Vec3(poke[7], poke[8], poke[9]) - Vec3(0, -testing::kBlockMass, 0)).norm(), 1e-12);
+  EXPECT_EQ(poke[10], 2e-4);
+  EXPECT_EQ(poke[11], 0.0);
+  EXPECT_LT((Vec3(poke[12], poke[13], poke[14]) - Vec3(0.25, 0.5, 0.9)).norm(), 1e-6);
+
+  // The scene's strike at 0.2 s, and the ground: as a run notes them.
+  step(page, 60);
+  const std::span<const double> noted = page.take_blows();
+  ASSERT_FALSE(noted.empty());
+  EXPECT_EQ(noted.size() % PageWorld::kBlowNumbers, 0u);
+  EXPECT_TRUE(page.take_blows().empty());
+  page.restart(page.settings());
+  step(page, 60);
+  const std::size_t untouched = page.take_blows().size();
+  const Scene told = read_scene(scene());
+  const RunResult run = run_scene(told, load_models(told), {.steps = 60, .keep_blows = true});
+  EXPECT_EQ(untouched, PageWorld::kBlowNumbers * run.trajectory.blows.size());
+  EXPECT_GT(untouched, PageWorld::kBlowNumbers);
 }
 
 TEST_F(PageWorldTest, SettingsOfTheNextStartAreTaken) {

@@ -24,7 +24,7 @@ using limber::Vec3;
 std::unique_ptr<PageWorld> page;
 std::string error, text;
 PageHit hit;
-std::span<const double> ray;
+std::span<const double> ray, blows;
 double answer[16];
 
 template <class F>
@@ -137,8 +137,8 @@ EMSCRIPTEN_KEEPALIVE int page_pin() {
   return guarded([] { page->pin(hit); });
 }
 EMSCRIPTEN_KEEPALIVE void page_unpin() { page->unpin(); }
-EMSCRIPTEN_KEEPALIVE int page_poke(double dx, double dy, double dz) {
-  return guarded([&] { page->poke(hit, {dx, dy, dz}); });
+EMSCRIPTEN_KEEPALIVE int page_poke(double dx, double dy, double dz, double contact_time) {
+  return guarded([&] { page->poke(hit, {dx, dy, dz}, contact_time); });
 }
 EMSCRIPTEN_KEEPALIVE int page_drop(int model, double x, double y, double z) {
   return guarded([&] { page->drop(model, {x, y, z}); });
@@ -146,6 +146,38 @@ EMSCRIPTEN_KEEPALIVE int page_drop(int model, double x, double y, double z) {
 EMSCRIPTEN_KEEPALIVE int page_show_mode(int body, int mode, double amplitude) {
   return guarded([&] { page->show_mode(body, mode, amplitude); });
 }
+
+// Sound of model i: 0 eigenvalues, 1 decays, 2 gains (doubles), 3 shapes (floats); null where it has none.
+EMSCRIPTEN_KEEPALIVE const void* page_sound_data(int model, int what) {
+  const void* data = nullptr;
+  guarded([&] {
+    const limber::SoundingBody& body = page->sounding(model);
+    switch (what) {
+      case 0:
+        data = body.modes().eigenvalues.data();
+        break;
+      case 1:
+        data = body.modes().decays.data();
+        break;
+      case 2:
+        data = body.gains().data();
+        break;
+      default:
+        data = body.modes().shapes.data();
+    }
+  });
+  return data;
+}
+EMSCRIPTEN_KEEPALIVE double page_loudness(int model, double contact_time) {
+  return page->loudness(model, contact_time);
+}
+EMSCRIPTEN_KEEPALIVE void page_listen(int on) { page->listen(on != 0); }
+// Blows since the last call, PageWorld::kBlowNumbers each: how many numbers, and where they are until the next call.
+EMSCRIPTEN_KEEPALIVE int page_blows() {
+  blows = page->take_blows();
+  return static_cast<int>(blows.size());
+}
+EMSCRIPTEN_KEEPALIVE const double* page_blow_numbers() { return blows.data(); }
 
 EMSCRIPTEN_KEEPALIVE int page_keep() {
   return guarded([] { page->keep(); });

@@ -84,11 +84,14 @@ std::string describe(const Scene& scene, const SceneModels& models, std::span<co
   out["contact"] = scene.contacts.options.has_value();
   out["models"] = Json::array();
   for (const PageModel& model : shown)
-    out["models"].push_back({{"name", model.name},
-                             {"vertices", model.rest.size() / 3},
-                             {"triangles", model.triangles.size() / 3},
-                             {"frequencies", model.frequencies},
-                             {"visible_amplitudes", model.visible_amplitudes}});
+    out["models"].push_back(
+        {{"name", model.name},
+         {"sound",
+          {{"modes", model.sound ? model.sound->modes() : 0}, {"vertices", model.sound ? model.sound->vertices : 0}}},
+         {"vertices", model.rest.size() / 3},
+         {"triangles", model.triangles.size() / 3},
+         {"frequencies", model.frequencies},
+         {"visible_amplitudes", model.visible_amplitudes}});
   out["bodies"] = Json::array();
   for (const PageBody& body : bodies) out["bodies"].push_back({{"name", body.name}, {"model", body.model}});
   out["statics"] = Json::array();

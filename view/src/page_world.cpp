@@ -14,6 +14,7 @@
 #include "limber/scene/scene_player.h"
 #include "page_history.h"
 #include "page_model.h"
+#include "page_sound.h"
 #include "page_tracks.h"
 
 namespace limber {
@@ -80,6 +81,7 @@ struct PageWorld::Impl {
   internal::Hands hands;
   internal::PageHistory history;
   std::vector<internal::JointPlace> joint_places;
+  internal::PageSound sound;
   struct {
     std::vector<float> frame;
     std::vector<double> numbers, joint_frames, sensor_counts, ray_places, amplitudes,
@@ -104,6 +106,8 @@ void PageWorld::Impl::start() {
     if (fresh) {
       kinds.push_back(internal::with_settings(model, settings));
       shown.push_back(internal::page_model(*kinds.back()));
+      const std::shared_ptr<const SoundModes>& heard = models.sound_of_body[kind_of_body.size()];
+      if (heard && heard->modes() > 0) shown.back().sound = heard;
     }
     model = kinds[static_cast<std::size_t>(found->second)];
     kind_of_body.push_back(found->second);
@@ -114,6 +118,7 @@ void PageWorld::Impl::start() {
   for (std::size_t i = 0; i < scene.bodies.size(); ++i)
     bodies.push_back({player->bodies()[i], kind_of_body[i], scene.bodies[i].name});
   hands = {};
+  sound.begin(shown, kinds);
   joint_places = internal::joint_places(scene, world(), bodies);
 }
 
@@ -151,6 +156,7 @@ void PageWorld::step() {
   Impl& m = *impl_;
   m.times = {};
   m.player->step();
+  if (m.sound.listens()) m.sound.note_step(m.scene, *m.player, m.bodies);
   for (std::size_t i = 0; i < kStages; ++i) m.told_to_page.stage_seconds[i] = m.times[static_cast<Stage>(i)].seconds;
 }
 std::span<const double> PageWorld::stage_seconds() const { return impl_->told_to_page.stage_seconds; }
@@ -298,11 +304,20 @@ int PageWorld::pins() const {
                                         [&](HandleId h) { return impl_->world().contains(h); }));
 }
 
-void PageWorld::poke(const PageHit& hit, const Vec3& direction) {
+void PageWorld::poke(const PageHit& hit, const Vec3& direction, double contact_time) {
   if (hit.body < 0) return;
   Impl& m = *impl_;
   const double mass = m.world().model(m.id(hit.body)).data().mass;
-  m.world().apply_impulse(m.id(hit.body), hit.at, mass * m.settings.poke_speed * direction.normalized());
+  const Vec3 impulse = mass * m.settings.poke_speed * direction.normalized();
+  m.world().apply_impulse(m.id(hit.body), hit.at, impulse);
+  if (!m.sound.listens()) return;
+  const RigidTransform to_body = m.world().body(m.id(hit.body)).pose.inverse();
+  m.sound.note({.body = static_cast<std::size_t>(hit.body),
+                .position = hit.point,
+                .point = to_body * hit.point,
+                .impulse = to_body.q * impulse,
+                .contact_time = contact_time},
+               0.0, m.bodies);
 }
 
 void PageWorld::drop(int model, const Vec3& position) {
@@ -338,6 +353,16 @@ void PageWorld::show_mode(int body, Index mode, double amplitude) {
     m.told_to_page.amplitudes[static_cast<std::size_t>(mode)] = amplitude;
   m.world().set_amplitudes(id, m.told_to_page.amplitudes, rest);
 }
+
+// Sound ---------------------------------------------------------------------------------------------------------------
+
+const SoundingBody& PageWorld::sounding(int model) { return impl_->sound.sounding(model); }
+double PageWorld::loudness(int model, double contact_time) {
+  return impl_->sound.sounding(model).largest_pressure(contact_time) *
+         impl_->kinds[static_cast<std::size_t>(model)]->data().mass;
+}
+void PageWorld::listen(bool on) { impl_->sound.listen(on); }
+std::span<const double> PageWorld::take_blows() { return impl_->sound.take(); }
 
 // History -------------------------------------------------------------------------------------------------------------
 

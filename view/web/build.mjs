@@ -1,5 +1,5 @@
 // node build.mjs ENGINE_FOLDER OUT.cpp: the page without a scene, all in one file, as a C++ constant. ENGINE_FOLDER has
-// page_engine.mjs and page_engine.wasm; limber-view puts the files of a scene in the place of "@FILES@".
+// page_engine.mjs, page_engine.wasm and page_sound.wasm; limber-view puts the files of a scene in the place of "@FILES@".
 import { createHash } from 'node:crypto';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
@@ -10,28 +10,31 @@ import esbuild from 'esbuild';
 const [engine, out] = process.argv.slice(2);
 const here = dirname(fileURLToPath(import.meta.url)), read = (...path) => readFileSync(join(...path), 'utf8');
 
+const small = { minify: true, write: false, target: 'es2022', legalComments: 'none', charset: 'ascii' };
+const inElement = ({ outputFiles: [{ text }] }) => text.replaceAll('</script', '<\\/script').replaceAll('<!--', '<\\!--');
 const bundle = await esbuild.build({
   entryPoints: [join(here, 'main.js')],
+  ...small,
   bundle: true,
-  minify: true,
-  write: false,
   format: 'iife',
-  target: 'es2022',
   platform: 'browser',
   alias: { 'page-engine': join(engine, 'page_engine.mjs') },
   external: ['module', 'fs', 'path', 'url', 'crypto', 'worker_threads', 'ws'],  // what the engine asks Node for
-  legalComments: 'none',
-  charset: 'ascii',
 });
-const script = bundle.outputFiles[0].text.replaceAll('</script', '<\\/script').replaceAll('<!--', '<\\!--'), style = read(here, 'style.css');
+const script = inElement(bundle), style = read(here, 'style.css');
+const zipped = (name) => gzipSync(readFileSync(join(engine, name)), { level: 9 }).toString('base64');
 const hash = (text) => `'sha256-${createHash('sha256').update(text, 'utf8').digest('base64')}'`;
 const parts = {
-  CSP: `default-src 'none'; script-src ${hash(script)} 'wasm-unsafe-eval'; style-src ${hash(style)}; img-src data:; base-uri 'none'; form-action 'none'`,
+  CSP: `default-src 'none'; script-src ${hash(script)} 'strict-dynamic' 'wasm-unsafe-eval'; style-src ${hash(style)}; img-src data:; base-uri 'none'; form-action 'none'`,
   STYLE: style,
   SCRIPT: script,
   LICENCES: ['In this page: limber (MIT licence), three.js, Eigen (MPL-2.0), Highway (Apache-2.0), JSON for Modern C++ (MIT), and the C and C++ libraries of Emscripten (MIT, Apache-2.0 with LLVM exception).',
     `three.js:\n${read(here, 'node_modules', 'three', 'LICENSE')}`].join('\n\n'),
-  ENGINE: gzipSync(readFileSync(join(engine, 'page_engine.wasm')), { level: 9 }).toString('base64'),
+  // A module of the thread that plays has an address. 'strict-dynamic' lets the script that has the hash load one of data:, and markup
+  // none; from disk Chromium refuses worklets of blob:.
+  WORKLET: inElement(await esbuild.build({ ...small, entryPoints: [join(here, 'sound_worklet.js')] })),
+  SOUND: zipped('page_sound.wasm'),
+  ENGINE: zipped('page_engine.wasm'),
 };
 for (const text of Object.values(parts)) if (/<\/(script|style)/i.test(text)) throw new Error('a part of the page would end its element');
 const page = read(here, 'index.html').replace(/@([A-Z]+)@/g, (all, name) => parts[name] ?? all);

@@ -8,7 +8,7 @@ export function bytesOf(base64) {
   return bytes;
 }
 
-async function unzipped(bytes) {
+export async function unzipped(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
@@ -105,9 +105,26 @@ export class Engine {
   }
   pin() { this.check(this.module._page_pin()); }
   unpin() { this.module._page_unpin(); }
-  poke(along) { this.check(this.module._page_poke(...along)); }
+  /** @param contactTime seconds, for the ear alone */
+  poke(along, contactTime) { this.check(this.module._page_poke(...along, contactTime)); }
   drop(model, at) { this.check(this.module._page_drop(model, ...at)); this.describe(); }
   showMode(body, mode, amplitude) { this.check(this.module._page_show_mode(body, mode, amplitude)); }
+
+  /** What one hears of a model: null, or its modes at the vertices of the surface that is struck. */
+  sound(model) {
+    const { modes, vertices } = this.scene.models[model].sound, data = (what) => this.module._page_sound_data(model, what);
+    if (modes === 0) return null;
+    const [eigenvalues, decays, gains] = [0, 1, 2].map((what) => this.doubles(data(what), modes));
+    return { modes, vertices, eigenvalues, decays, gains, shapes: this.floats(data(3), 3 * modes * vertices) };
+  }
+  /** Pascals at one metre that no poke at 1 m/s exceeds. */
+  loudness(model, contactTime) { return this.module._page_loudness(model, contactTime); }
+  listen(on) { this.module._page_listen(on ? 1 : 0); }
+  /** Blows since the last call, 15 numbers each: PageWorld::take_blows() */
+  takeBlows() {
+    const count = this.module._page_blows();
+    return this.doubles(this.module._page_blow_numbers(), count);
+  }
 
   kept() { return this.module._page_kept(); }
   keptStep(key) { return this.module._page_kept_step(key); }

@@ -5,6 +5,7 @@ import { tell } from './message.js';
 import { Panel } from './panel.js';
 import { PoseApp } from './pose.js';
 import { PoseEngine } from './pose_engine.js';
+import { Sound } from './sound.js';
 import { Stage } from './stage.js';
 
 const MOST_STEPS_A_FRAME = 6;
@@ -24,6 +25,7 @@ class App {
     this.ray = null;    // that is drawn: {from, along, places}
     this.pointer = null;  // a pointer's last place over the picture, until it was looked at
     stage.load(engine);
+    this.sound = new Sound(this);
     this.panel = new Panel(document.getElementById('panel'), this);
     this.listen();
     this.fit();
@@ -67,7 +69,10 @@ class App {
     event.stopImmediatePropagation();
     if (this.tool === 'follow') return this.stage.follow(hit.body);
     this.resume();
-    if (this.tool === 'poke') this.engine.poke(along);
+    if (this.tool === 'poke') {
+      this.engine.poke(along, this.sound.contactTime);
+      this.sound.collect(0);
+    }
     if (this.tool === 'pin') this.engine.pin();
     if (this.tool === 'drag' && this.engine.grab()) {
       this.dragged = hit.point;
@@ -111,9 +116,11 @@ class App {
     this.show();
   }
 
-  step() {
+  /** @param delay s, after which one hears it */
+  step(delay = 0) {
     const began = performance.now();
     this.engine.step();
+    this.sound.collect(delay);
     this.panel.note(this.engine.numbers(), performance.now() - began, this.engine.stages());
   }
 
@@ -194,11 +201,13 @@ class App {
     if (this.playing) {
       this.left = Math.min(this.left + this.speed * seconds, MOST_STEPS_A_FRAME * this.engine.scene.settings.step);
       const began = performance.now(), { step } = this.engine.scene.settings;
-      for (; this.left >= step && performance.now() - began < LONGEST_FRAME; this.left -= step) this.step();
+      for (let delay = 0; this.left >= step && performance.now() - began < LONGEST_FRAME; this.left -= step, delay += step / this.speed)
+        this.step(delay);
     }
     // Modes of any frequency are seen to swing once a second.
     if (this.mode) this.bend(this.mode.body, this.mode.mode, Math.sin((2e-3 * Math.PI) * (performance.now() - this.mode.began)));
     this.hover();
+    this.sound.send();
     this.show();
   }
 

@@ -27,6 +27,7 @@ export class Panel {
     this.state = element('small');
     this.joints = element('table');
     this.sheets = new Sheets(host, ['Controls', 'Details'], () => app.fit());
+    if (app.sound.possible) host.querySelector('nav').append(app.sound.button());
     this.build();
   }
 
@@ -40,7 +41,8 @@ export class Panel {
       section('Hand', true, element('div', { className: 'row' }, ...this.tools, button('Let pins go', () => app.unpin())),
         this.live('drag_frequency', 'Hand', { min: 0.5, max: 12, step: 0.1, show: (x) => `${x.toFixed(1)} Hz` }),
         this.live('poke_speed', 'Poke', { min: 0.05, max: 5, step: 0.05, show: (x) => `${x.toFixed(2)} m/s` }),
-        this.drops())], [
+        this.drops()),
+      ...(app.sound.possible ? [section('Sound', true, ...app.sound.controls())] : [])], [
       section('World', true, ...this.world()),
       section('Modes', scene.joints.length === 0 && !scene.contact, ...this.modes()),
       section('Joints', scene.joints.length > 0, this.joints),

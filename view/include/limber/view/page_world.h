@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "limber/engine/world.h"
+#include "limber/scene/blows.h"
 #include "limber/scene/scene_file.h"
 
 namespace limber {
@@ -42,6 +43,7 @@ struct PageModel {
   std::vector<double> frequencies{};  ///< Hz, k
   /// The amplitude at which a mode moves some vertex by a tenth of the model's size, k.
   std::vector<double> visible_amplitudes{};
+  std::shared_ptr<const SoundModes> sound{};  ///< null: one does not hear it
 };
 
 /// The first point of any body that moves, as contact has it, which a ray meets within 10 km: World::cast_ray().
@@ -106,11 +108,24 @@ class PageWorld {
   void pin(const PageHit& hit);
   void unpin();
   int pins() const;
-  void poke(const PageHit& hit, const Vec3& direction);
+  /// @param contact_time s, for the ear alone: Blow::contact_time
+  void poke(const PageHit& hit, const Vec3& direction, double contact_time = 1e-3);
   /// Another body of a model.
   void drop(int model, const Vec3& position);
   /// Shows a mode by itself: all others of the body are at rest.
   void show_mode(int body, Index mode, double amplitude);
+
+  // Sound, for a synthesizer elsewhere (limber/sound/synthesizer.h).
+  /// The body that models()[model].sound is of. @throws InvalidArgument where there is none
+  const SoundingBody& sounding(int model);
+  /// Pa at one metre that no poke at 1 m/s exceeds, however a body of the model is turned.
+  double loudness(int model, double contact_time);
+  /// Notes blows from now on, or no longer.
+  void listen(bool on);
+  static constexpr std::size_t kBlowNumbers = 15;
+  /// Blows on bodies that have a sound since the last call: body, vertices and weights (3 each), impulse on it (3, body
+  /// frame, N·s), contact time (s), delay after the step's start (s), place (3, world, m).
+  std::span<const double> take_blows();
 
   // History: states at steps taken, the oldest thinned out when there are too many.
   void keep();
