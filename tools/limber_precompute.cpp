@@ -111,6 +111,24 @@ void precompute_assembly(Program& program, const PrecomputeArguments& a, const B
                                                      fs::absolute(a.output).lexically_relative(folder).string()));
 }
 
+/// The modes of a band, into a file of their own.
+void precompute_slice(Program& program, const PrecomputeArguments& a, const BakeInput& input,
+                      const BakeOptions& options) {
+  TbbJobs jobs;
+  std::vector<SpectrumSlice> slices =
+      bake_slices(input, options, {a.slice.band[0], a.slice.band[1]}, program.warnings(), jobs);
+  nlohmann::ordered_json bodies = nlohmann::ordered_json::array();
+  for (SpectrumSlice& slice : slices) {
+    slice.of = a.slice.of;
+    bodies.push_back({{"nodes", slice.nodes}, {"below_low", slice.below_low}, {"below_high", slice.below_high}});
+    program.print(fmt::format("{} to {} Hz: {} modes, {} eigenvalues below, {} below the upper end\n", slice.band.low,
+                              slice.band.high, slice.modes(), slice.below_low, slice.below_high));
+  }
+  program.write_file(a.output, slice_bytes(slices));
+  program.report()["slices"] = std::move(bodies);
+  program.report()["peak_memory_bytes"] = peak_memory_bytes();
+}
+
 void precompute(Program& program, const PrecomputeArguments& a) {
   if (a.list_materials) return print_materials(program);
   if (!a.farm.manifest.empty()) {
@@ -126,6 +144,7 @@ void precompute(Program& program, const PrecomputeArguments& a) {
   check_assembly(a);
   AskedBake asked = asked_bake(program, a);
   BakeOptions& options = asked.options;
+  read_slices_of(program, a, program.options().count("--modes") > 0, options);
   if (a.assembly.auto_joints || !a.assembly.options.joints_file.empty()) {
     if (!options.regions.empty())
       throw InvalidArgument("--materials: regions by shapes are for single bodies, not for assemblies");
@@ -143,6 +162,7 @@ void precompute(Program& program, const PrecomputeArguments& a) {
   choose_elements(a, program.report().contains("surface"), input.mesh.has_mid_edge_nodes(), options);
 
   program.progress().stage("modes");
+  if (!a.slice.band.empty()) return precompute_slice(program, a, input, options);
   TbbJobs jobs;
   const BakeResult result = bake(input, options, program.warnings(), jobs);
   program.progress().stage("writing");

@@ -125,6 +125,31 @@ Likeness most_axial_mode(const ModalModel& bar, int n, double length) {
   return best;
 }
 
+TEST_F(Precompute, SlicesThatAreMergedGiveTheFrequenciesOfOneBakeAndAMissingOneIsNamed) {
+  write_gmsh(folder / "bar.msh", testing::tet_box(8, 2, 2, {0.4, 0.1, 0.08}));
+  const std::vector<std::string> bar = {"bar.msh", "--material", "steel"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), bar.begin(), bar.end());
+    return more;
+  };
+  const auto whole = report(with({"--modes", "30"}))["frequencies_hz"].get<std::vector<double>>();
+  const std::string cut = std::to_string(0.5 * (whole[9] + whole[10])),
+                    end = std::to_string(0.5 * (whole[24] + whole[25]));
+  EXPECT_EQ(run(with({"--slice", "0," + cut, "--of", "2", "-o", "low"})).exit_code, 0);
+  EXPECT_EQ(run(with({"--slice", cut + "," + end, "--of", "2", "-o", "high"})).exit_code, 0);
+  const Json merged = report(with({"--merge", "high", "--merge", "low"}));
+  EXPECT_TRUE(merged["certified"]);
+  const auto frequencies = merged["frequencies_hz"].get<std::vector<double>>();
+  ASSERT_EQ(frequencies.size(), 25u);
+  for (std::size_t i = 0; i < frequencies.size(); ++i) EXPECT_NEAR(frequencies[i], whole[i], 1e-10 * whole[i]);
+
+  const ProgramResult alone = run(with({"--merge", "low", "-o", "half.glb"}));
+  EXPECT_NE(alone.exit_code, 0);
+  EXPECT_THAT(alone.err, HasSubstr("1 of 2 are here"));
+  EXPECT_FALSE(fs::exists(folder / "half.glb"));
+  EXPECT_THAT(run({"bar.msh", "--material", "copper", "--merge", "low", "-o", "a.glb"}).err, HasSubstr("another mesh"));
+}
+
 TEST_F(Precompute, BarAtZeroPoissonRatioRingsAtTheExactAxialFrequencies) {
   // ν = 0: the axial modes of a free bar are those of a string, f_n = n/(2L) √(E/ρ). Consistent mass overestimates the
   // n-th by (nπ/N)²/24 in one dimension, N elements long; across the bar tets differ from that by less than half of it.

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "limber/core/error.h"
 #include "limber/mesh_assimp/read_surface_mesh.h"
@@ -68,6 +70,22 @@ void declare_mode_options(CLI::App& app, PrecomputeArguments& a) {
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   app.add_flag("--no-certify", a.modal.no_certify, "skip the proof that no mode was missed (for huge meshes)");
+}
+
+void declare_slice_options(CLI::App& app, PrecomputeArguments& a) {
+  app.add_option("--slice", a.slice.band,
+                 "compute the modes between two frequencies alone and write them to --output, for --merge")
+      ->type_name("HZ,HZ")
+      ->delimiter(',')
+      ->expected(2);
+  app.add_option("--of", a.slice.of,
+                 "how many slices there are in all, so that --merge can tell whether one is missing")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1'000'000));
+  app.add_option("--merge", a.slice.merge,
+                 "take the modes of these slices, which follow each other from 0 Hz on, made of the same mesh with the "
+                 "same options; repeatable")
+      ->type_name("FILE");
 }
 
 void declare_geometry_options(CLI::App& app, PrecomputeArguments& a) {
@@ -286,6 +304,7 @@ void declare_options(CLI::App& app, PrecomputeArguments& a) {
   app.add_option("-o,--output", a.output, "asset to write")->type_name("ASSET.glb");
   declare_material_options(app, a);
   declare_mode_options(app, a);
+  declare_slice_options(app, a);
   declare_geometry_options(app, a);
   declare_assembly_options(app, a);
   declare_farm_options(app, a.farm);
@@ -336,6 +355,22 @@ void choose_elements(const PrecomputeArguments& a, bool made_here, bool has_mid_
   if (a.modal.mass.empty() && quadratic) options.analysis.mass = MassKind::kConsistent;
 }
 
+void read_slices_of(Program& program, const PrecomputeArguments& a, bool modes_given, BakeOptions& options) {
+  if (a.slice.of != 1 && a.slice.band.empty()) throw InvalidArgument("--of is for --slice, which is not given");
+  if (!a.slice.band.empty() && !a.slice.merge.empty()) throw InvalidArgument("--slice and --merge exclude each other");
+  std::map<std::string, int> modes;  // of each body
+  for (const std::string& file : a.slice.merge) {
+    program.add_input(file);
+    for (SpectrumSlice& slice : read_slices(file)) {
+      modes[slice.problem] += slice.modes();
+      options.analysis.slices.push_back(std::move(slice));
+    }
+  }
+  if (modes_given) return;
+  for (const auto& [problem, count] : modes)
+    options.analysis.modes = options.limits.max_modes = std::max(options.analysis.modes, count);
+}
+
 void check_assembly(const PrecomputeArguments& a) {
   if (a.assembly.auto_joints && !a.assembly.options.joints_file.empty())
     throw InvalidArgument("the joints are given twice: by --joints and by --auto-joints");
@@ -348,6 +383,8 @@ void check_assembly(const PrecomputeArguments& a) {
   if (is_one &&
       !(a.geometry.fixes.empty() && a.geometry.render_surface.empty() && a.geometry.collision_surface.empty()))
     throw InvalidArgument("--fix, --render-surface and --collision-surface are for single bodies, not for assemblies");
+  if (is_one && !(a.slice.band.empty() && a.slice.merge.empty()))
+    throw InvalidArgument("--slice and --merge are for single meshes, not for assemblies");
   if (is_one && !a.modal.frequency_error.empty())
     throw InvalidArgument("--frequency-error is for single surfaces, not for assemblies");
   if (a.assembly.options.free && !a.assembly.options.ground.empty())

@@ -57,6 +57,13 @@ struct AssemblyArguments {
   std::string scene;
 };
 
+/// Of a spectrum that is computed in parts.
+struct SliceArguments {
+  std::vector<double> band;  ///< Hz; empty: none
+  int of = 1;
+  std::vector<std::string> merge;  ///< files
+};
+
 struct PrecomputeArguments {
   std::string mesh, output;
   bool list_materials = false;
@@ -65,6 +72,7 @@ struct PrecomputeArguments {
   GeometryArguments geometry;
   ResponseArguments response;
   AssemblyArguments assembly;
+  SliceArguments slice;
   FarmArguments farm;
 };
 
@@ -86,6 +94,9 @@ double frequency_error_of(const PrecomputeArguments& a);
 
 /// Quadratic elements where limber makes the tets; each kind with the mass by which its frequencies err less.
 void choose_elements(const PrecomputeArguments& a, bool made_here, bool has_mid_edge_nodes, BakeOptions& options);
+
+/// Takes the modes of --merge, all of them unless --modes says fewer. @param modes_given --modes is
+void read_slices_of(Program& program, const PrecomputeArguments& a, bool modes_given, BakeOptions& options);
 
 /// Options for assemblies alone, and for single bodies alone.
 void check_assembly(const PrecomputeArguments& a);

@@ -81,13 +81,18 @@ void warn_of_unused_nodes(const TetMesh& mesh, std::span<const char> fixed, Warn
   warnings.push_back(message);
 }
 
-}  // namespace
+/// The mesh as it is analysed, cut into bodies.
+struct Bodies {
+  std::vector<Material> materials;  // one per region of the whole mesh
+  std::vector<internal::BodyInput> bodies;
+};
 
-BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& warnings, Jobs& jobs) {
+Bodies make_bodies(const BakeInput& input, const BakeOptions& options, Warnings& warnings) {
   options.validate();
   if (input.mesh.tets.empty()) throw InputError("bake: the mesh holds no tetrahedra");
   TetMesh mesh = input.mesh;
-  const auto materials = internal::assign_regions(mesh, options.materials, options.regions, input.named_faces);
+  Bodies made;
+  made.materials = internal::assign_regions(mesh, options.materials, options.regions, input.named_faces);
   auto fixed = selected_flags(input.mesh, options.fixed);
   auto loaded = selected_flags(input.mesh, options.residual.nodes);
   warn_of_unused_nodes(input.mesh, fixed, warnings);
@@ -98,11 +103,8 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
   const Index bodies = 1 + *std::max_element(component.begin(), component.end());
   auto render = internal::deal_if_any(input.render, mesh, component, bodies, "render");
   auto collision = internal::deal_if_any(input.collision, mesh, component, bodies, "collision");
-
-  BakeResult result;
-  result.asset.provenance = input.provenance;
   for (Index b = 0; b < bodies; ++b) {
-    internal::BodyInput body;
+    internal::BodyInput& body = made.bodies.emplace_back();
     body.name = bodies == 1 ? input.name : input.name + "_" + std::to_string(b + 1);
     body.part = extract_component(mesh, component, b);
     for (std::size_t n = 0; n < body.part.node_of.size(); ++n) {
@@ -115,13 +117,33 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
       if (body_of(patch, mesh, component) == b) body.patches.push_back(patch);
     body.render = std::move(render[b]);
     body.collision = std::move(collision[b]);
+  }
+  return made;
+}
+
+}  // namespace
+
+BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& warnings, Jobs& jobs) {
+  const Bodies made = make_bodies(input, options, warnings);
+  BakeResult result;
+  result.asset.provenance = input.provenance;
+  for (const internal::BodyInput& body : made.bodies) {
     internal::BakedBody baked =
-        internal::bake_body(body, materials, options, result.bodies.emplace_back(), warnings, jobs);
+        internal::bake_body(body, made.materials, options, result.bodies.emplace_back(), warnings, jobs);
     result.asset.bodies.push_back(std::move(baked.model));
     result.asset.sounds.push_back(std::move(baked.sound));
     result.asset.frequency_errors.push_back(result.bodies.back().modes.kept_errors);
   }
   return result;
+}
+
+std::vector<SpectrumSlice> bake_slices(const BakeInput& input, const BakeOptions& options, const FrequencyBand& band,
+                                       Warnings& warnings, Jobs& jobs) {
+  const Bodies made = make_bodies(input, options, warnings);
+  std::vector<SpectrumSlice> slices;
+  for (const internal::BodyInput& body : made.bodies)
+    slices.push_back(analyse_slice(body.part.mesh, made.materials, body.fixed, band, options.analysis, warnings, jobs));
+  return slices;
 }
 
 }  // namespace limber

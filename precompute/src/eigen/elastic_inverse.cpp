@@ -49,7 +49,7 @@ Eigen::MatrixXd ScaledProblem::mass_times(const Eigen::Ref<const Eigen::MatrixXd
 }
 
 ElasticInverse::ElasticInverse(const ScaledProblem& problem, const std::vector<Index>& node_order)
-    : problem_(problem),
+    : SpectralInverse(problem),
       pinned_(choose_pins(problem.N)),
       kept_(all_but(problem.size(), pinned_)),
       solver_(factor(node_order)) {}
@@ -71,17 +71,30 @@ CholeskySolver ElasticInverse::factor(const std::vector<Index>& node_order) {
       "materials whose stiffnesses differ by more than about 1e12");
 }
 
-Eigen::MatrixXd ElasticInverse::apply(const Eigen::Ref<const Eigen::MatrixXd>& F) {
+Eigen::MatrixXd ElasticInverse::answer(const Eigen::Ref<const Eigen::MatrixXd>& balanced) {
+  Eigen::MatrixXd U = Eigen::MatrixXd::Zero(balanced.rows(), balanced.cols());
+  U(kept_, Eigen::all) = solver_.solve(balanced(kept_, Eigen::all));
+  return U;
+}
+
+ShiftedInverse::ShiftedInverse(const ScaledProblem& problem, const std::vector<Index>& node_order, double sigma)
+    : SpectralInverse(problem, -sigma), factor_(problem.K, node_order, IndefiniteFactor::Keeps::kFactor) {
+  factor_.factor(add_mass(problem.K, shift_, problem.node_mass));
+}
+
+Eigen::MatrixXd ShiftedInverse::answer(const Eigen::Ref<const Eigen::MatrixXd>& balanced) {
+  return factor_.solve(balanced);
+}
+
+Eigen::MatrixXd SpectralInverse::apply(const Eigen::Ref<const Eigen::MatrixXd>& F) {
   const auto& [N, MN] = std::tie(problem_.N, problem_.MN);
   solves_ += static_cast<int>(F.cols());
-  const Eigen::MatrixXd balanced = F - MN * (N.transpose() * F);
-  Eigen::MatrixXd U = Eigen::MatrixXd::Zero(F.rows(), F.cols());
-  U(kept_, Eigen::all) = solver_.solve(balanced(kept_, Eigen::all));
+  Eigen::MatrixXd U = answer(F - MN * (N.transpose() * F));
   U -= N * (MN.transpose() * U);
   return U;
 }
 
-Eigen::MatrixXd ElasticInverse::apply_accurately(const Eigen::Ref<const Eigen::MatrixXd>& F) {
+Eigen::MatrixXd SpectralInverse::apply_accurately(const Eigen::Ref<const Eigen::MatrixXd>& F) {
   const Eigen::MatrixXd& MN = problem_.MN;
   Eigen::MatrixXd U = apply(F);
   const auto lengths = [&](const Eigen::MatrixXd& X) -> Eigen::ArrayXd {
@@ -90,7 +103,7 @@ Eigen::MatrixXd ElasticInverse::apply_accurately(const Eigen::Ref<const Eigen::M
   double change_before = 1.0;
   for (int step = 0; step < kMaxRefinements; ++step) {
     Eigen::MatrixXd residual = F - MN * (problem_.N.transpose() * F) - problem_.stiffness_times(U);
-    if (shift_ > 0.0) residual -= shift_ * problem_.mass_times(U);
+    if (shift_ != 0.0) residual -= shift_ * problem_.mass_times(U);
     const Eigen::MatrixXd correction = apply(residual);
     const double change = (lengths(correction) / lengths(U)).maxCoeff();
     if (change > kContraction * change_before) break;  // no longer improves

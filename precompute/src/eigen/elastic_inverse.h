@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "eigen/cholesky_solver.h"
+#include "eigen/indefinite_factor.h"
 #include "limber/precompute/sparse_matrix.h"
 
 namespace limber::internal {
@@ -35,31 +36,61 @@ struct ScaledProblem {
   Eigen::MatrixXd mass_times(const Eigen::Ref<const Eigen::MatrixXd>& X) const;
 };
 
-class ElasticInverse {
+/// P (K + sM)⁻¹ Pᵀ for some s. On an elastic mode of eigenvalue λ it has the eigenvalue 1/(λ + s).
+class SpectralInverse {
  public:
-  /// @param node_order from order_nodes(problem.K). Keeps a reference to the problem.
-  /// @throws ComputationError if no factor can be had
-  ElasticInverse(const ScaledProblem& problem, const std::vector<Index>& node_order);
+  virtual ~SpectralInverse() = default;
 
-  /// K⁺ F, or P (K + sM)⁻¹ Pᵀ F.
+  /// P (K + sM)⁻¹ Pᵀ F
   Eigen::MatrixXd apply(const Eigen::Ref<const Eigen::MatrixXd>& F);
 
   /// The same, improved by residuals that stiffness_times() gives, as long as that changes it: for loads that are all
   /// of size F_i ~ M w_i, and bodies so slender or of such different stiffnesses that round-off of K shows.
   Eigen::MatrixXd apply_accurately(const Eigen::Ref<const Eigen::MatrixXd>& F);
 
-  double shift() const { return shift_; }  ///< s; 0 unless K_pin would not factor
+  double shift() const { return shift_; }  ///< s
   int solves() const { return solves_; }   ///< right-hand sides so far
+
+ protected:
+  explicit SpectralInverse(const ScaledProblem& problem, double shift = 0.0) : problem_(problem), shift_(shift) {}
+
+  const ScaledProblem& problem_;
+  double shift_;
+
+ private:
+  /// An answer to a load that is orthogonal to N, up to motions of N.
+  virtual Eigen::MatrixXd answer(const Eigen::Ref<const Eigen::MatrixXd>& balanced) = 0;
+
+  int solves_ = 0;
+};
+
+/// K⁺; s = 0 unless K_pin does not factor.
+class ElasticInverse final : public SpectralInverse {
+ public:
+  /// @param node_order from order_nodes(problem.K). Keeps a reference to the problem.
+  /// @throws ComputationError if no factor can be had
+  ElasticInverse(const ScaledProblem& problem, const std::vector<Index>& node_order);
+
   const std::vector<Index>& pinned() const { return pinned_; }
 
  private:
-  const ScaledProblem& problem_;
   std::vector<Index> pinned_, kept_;  // degrees of freedom, ascending
-  double shift_ = 0.0;
-  int solves_ = 0;
   CholeskySolver solver_;
 
+  Eigen::MatrixXd answer(const Eigen::Ref<const Eigen::MatrixXd>& balanced) override;
   CholeskySolver factor(const std::vector<Index>& node_order);
+};
+
+/// Between eigenvalues: s = −σ, so that modes near σ have the largest eigenvalues, of both signs.
+class ShiftedInverse final : public SpectralInverse {
+ public:
+  /// @throws ComputationError if K − σM does not factor, as where σ is an eigenvalue. Keeps a reference to the problem.
+  ShiftedInverse(const ScaledProblem& problem, const std::vector<Index>& node_order, double sigma);
+
+ private:
+  IndefiniteFactor factor_;
+
+  Eigen::MatrixXd answer(const Eigen::Ref<const Eigen::MatrixXd>& balanced) override;
 };
 
 }  // namespace limber::internal

@@ -4,9 +4,12 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
+#include <vector>
 
 #include "eigen/canonical_modes.h"
+#include "eigen/sparse_operations.h"
 #include "limber/core/error.h"
 
 namespace limber::internal {
@@ -26,39 +29,37 @@ Eigen::Index subspace_for(Eigen::Index count) { return 8 + count * 8 / 5; }
 
 double gap_after(const Eigen::VectorXd& lambda, Eigen::Index i) { return (lambda[i] - lambda[i - 1]) / lambda[i - 1]; }
 
-/// The first place at or after `wanted` where a gap ends the list, or −1 if there is none among the pairs.
-Eigen::Index end_of_cluster(const Eigen::VectorXd& lambda, Eigen::Index wanted, Eigen::Index available) {
-  if (wanted == 0) return 0;
-  for (Eigen::Index i = wanted; i < lambda.size(); ++i)
-    if (gap_after(lambda, i) > kClusterGap) return i;
-  return lambda.size() == available ? available : -1;
-}
-
 Eigen::Index available(const ScaledProblem& problem) { return problem.size() - problem.N.cols(); }
 
-/// All eigenpairs of K⁺M, highest 1/λ first, by a dense solver; without N.
-Eigen::MatrixXd all_modes(const ScaledProblem& problem, ElasticInverse& inverse) {
+/// The `count` modes nearest to −s, nearest first, by a dense solver.
+Eigen::MatrixXd dense_modes(const ScaledProblem& problem, SpectralInverse& inverse, Eigen::Index count) {
   const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(problem.size(), problem.size());
   const Eigen::MatrixXd M = problem.mass_times(I);
   const Eigen::MatrixXd L = Eigen::LLT<Eigen::MatrixXd>(M).matrixL();
   const Eigen::MatrixXd operator_matrix = L.transpose() * inverse.apply(L);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver((operator_matrix + operator_matrix.transpose()) / 2.0);
-  const Eigen::MatrixXd Y = solver.eigenvectors().rightCols(available(problem)).rowwise().reverse();
+  const Eigen::VectorXd size = solver.eigenvalues().cwiseAbs();  // 1/|λ + s|, and 0 on N
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(size.size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](Eigen::Index i, Eigen::Index j) { return size[i] > size[j]; });
+  order.resize(static_cast<std::size_t>(count));
+  const Eigen::MatrixXd Y = solver.eigenvectors()(Eigen::all, order);
   return L.transpose().triangularView<Eigen::Upper>().solve(Y);
 }
 
-Eigen::MatrixXd first_guess(const ScaledProblem& problem, ElasticInverse& inverse, Eigen::Index count,
+/// The `count` modes nearest to −s.
+Eigen::MatrixXd first_guess(const ScaledProblem& problem, SpectralInverse& inverse, Eigen::Index count,
                             LanczosOptions options) {
   options.count = static_cast<int>(count);
   options.subspace = static_cast<int>(subspace_for(count));
   if (problem.size() <= kDenseSize || options.subspace > available(problem) / 2)
-    return all_modes(problem, inverse).leftCols(count);
+    return dense_modes(problem, inverse, count);
   const Eigen::MatrixXd none(problem.size(), 0);
   return lanczos(problem, inverse, none, none, options);
 }
 
-/// Modes orthogonal to the pairs, lowest first.
-Eigen::MatrixXd others(const ScaledProblem& problem, ElasticInverse& inverse, const EigenPairs& pairs, int count,
+/// Modes orthogonal to the pairs, those nearest to −s.
+Eigen::MatrixXd others(const ScaledProblem& problem, SpectralInverse& inverse, const EigenPairs& pairs, int count,
                        std::uint64_t seed) {
   count = static_cast<int>(std::min<Eigen::Index>(count, available(problem) - pairs.count()));
   const Eigen::Index subspace = std::min<Eigen::Index>(4 * count + 20, available(problem) - pairs.count());
@@ -75,6 +76,25 @@ Eigen::Index widest_gap(const Eigen::VectorXd& lambda, Eigen::Index first) {
   return best;
 }
 
+/// The pairs and further ones, orthogonal to each other.
+EigenPairs with_others(const ScaledProblem& problem, SpectralInverse& inverse, const EigenPairs& pairs,
+                       Eigen::Index missing, int search) {
+  const Eigen::MatrixXd more =
+      others(problem, inverse, pairs, static_cast<int>(missing) + 4, ~static_cast<std::uint64_t>(search));
+  Eigen::MatrixXd all(problem.size(), pairs.count() + more.cols());
+  all << pairs.W, more;
+  return refined(problem, inverse, all);
+}
+
+EigenPairs only_between(const EigenPairs& pairs, double low, double high) {
+  const double *begin = pairs.lambda.data(), *end = begin + pairs.count();
+  const Eigen::Index first = std::upper_bound(begin, end, low) - begin,
+                     count = std::lower_bound(begin, end, high) - begin - first;
+  return {.lambda = pairs.lambda.segment(first, count),
+          .W = pairs.W.middleCols(first, count),
+          .MW = pairs.MW.middleCols(first, count)};
+}
+
 }  // namespace
 
 void EigenPairs::keep_first(Eigen::Index count) {
@@ -83,7 +103,14 @@ void EigenPairs::keep_first(Eigen::Index count) {
   MW.conservativeResize(Eigen::NoChange, count);
 }
 
-EigenPairs refined(const ScaledProblem& problem, ElasticInverse& inverse, const Eigen::MatrixXd& X) {
+Eigen::Index end_of_cluster(const Eigen::VectorXd& lambda, Eigen::Index wanted, Eigen::Index available) {
+  if (wanted == 0) return 0;
+  for (Eigen::Index i = wanted; i < lambda.size(); ++i)
+    if (gap_after(lambda, i) > kClusterGap) return i;
+  return lambda.size() == available ? available : -1;
+}
+
+EigenPairs refined(const ScaledProblem& problem, SpectralInverse& inverse, const Eigen::MatrixXd& X) {
   const Eigen::MatrixXd MX = problem.mass_times(X);
   Eigen::MatrixXd Y = inverse.apply_accurately(MX), MY = problem.mass_times(Y);
   // Columns of length one, so that the Gram matrix below is near I however far the eigenvalues are apart.
@@ -128,12 +155,42 @@ void complete(const ScaledProblem& problem, ElasticInverse& inverse, EigenvalueC
       throw ComputationError("the certificate of completeness fails: " + std::to_string(zeros + below) +
                              " eigenvalues were found below a bound that has " +
                              std::to_string(zeros + below + missing) + " of them");
-    const Eigen::MatrixXd more =
-        others(problem, inverse, pairs, static_cast<int>(missing) + 4, ~static_cast<std::uint64_t>(search));
-    Eigen::MatrixXd all(problem.size(), pairs.count() + more.cols());
-    all << pairs.W, more;
-    pairs = refined(problem, inverse, all);
+    pairs = with_others(problem, inverse, pairs, missing, search);
     pairs_to_keep = std::max<Eigen::Index>(end_of_cluster(pairs.lambda, wanted, available(problem)), 0);
+  }
+}
+
+void confirm_zero_modes(const ScaledProblem& problem, const EigenPairs& pairs, EigenvalueCounter& counter,
+                        Warnings& warnings) {
+  const double sigma = pairs.lambda[0] / 2.0;
+  const double round_off = (problem.N.transpose() * multiply(problem.K, problem.N)).norm();
+  if (round_off > sigma / 10.0) {
+    warnings.push_back(
+        "the lowest frequencies lie within round-off of the stiffness matrix, so the number of zero modes is known "
+        "from "
+        "geometry alone");
+    return;
+  }
+  const int counted = counter.below(sigma);
+  if (counted != problem.N.cols())
+    throw ComputationError("the body's geometry allows " + std::to_string(problem.N.cols()) +
+                           " motions without deformation, but its stiffness matrix has " + std::to_string(counted) +
+                           " eigenvalues near zero: look for tetrahedra that are nearly flat, or materials whose "
+                           "stiffnesses differ by more than about 1e10");
+}
+
+EigenPairs modes_between(const ScaledProblem& problem, SpectralInverse& inverse, double low, double high,
+                         Eigen::Index count, LanczosOptions options) {
+  if (count == 0) return {Eigen::VectorXd(0), Eigen::MatrixXd(problem.size(), 0), Eigen::MatrixXd(problem.size(), 0)};
+  EigenPairs pairs = refined(problem, inverse, first_guess(problem, inverse, count, options));
+  for (int search = 0;; ++search) {
+    const Eigen::Index found = only_between(pairs, low, high).count();
+    if (found == count) return only_between(pairs, low, high);
+    if (found > count || search == kSearches)
+      throw ComputationError("the certificate of completeness fails: " + std::to_string(found) +
+                             " eigenvalues were found between two bounds that have " + std::to_string(count) +
+                             " between them");
+    pairs = with_others(problem, inverse, pairs, count - found, search);
   }
 }
 

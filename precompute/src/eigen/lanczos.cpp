@@ -24,7 +24,7 @@ using ConstColumn = Eigen::Map<const Eigen::VectorXd>;
 /// convergence compares with max(ε^⅔, |θ|), which means nothing for an operator in other units.
 class Operator {
  public:
-  Operator(ElasticInverse& inverse, const Eigen::MatrixXd& found, const Eigen::MatrixXd& mass_times_found)
+  Operator(SpectralInverse& inverse, const Eigen::MatrixXd& found, const Eigen::MatrixXd& mass_times_found)
       : inverse_(inverse), X_(found), MX_(mass_times_found) {}
 
   Eigen::VectorXd operator()(const Eigen::Ref<const Eigen::VectorXd>& Mx) {
@@ -36,7 +36,7 @@ class Operator {
   void set_scale(double scale) { scale_ = scale; }
 
  private:
-  ElasticInverse& inverse_;
+  SpectralInverse& inverse_;
   const Eigen::MatrixXd &X_, &MX_;
   double scale_ = 1.0;
 };
@@ -100,7 +100,7 @@ struct Arpack {
     if (info < 0) throw ComputationError("ARPACK dsaupd failed with info " + std::to_string(info));
   }
 
-  /// Ritz vectors, highest θ first.
+  /// Ritz vectors, ascending λ.
   Eigen::MatrixXd vectors(double tolerance) {
     std::vector<a_int> select(subspace);
     std::vector<double> values(count);
@@ -111,7 +111,7 @@ struct Arpack {
                   static_cast<a_int>(small_work.size()), info);
     if (info != 0) throw ComputationError("ARPACK dseupd failed with info " + std::to_string(info));
     const a_int converged = parameters[4];
-    // In mode 3 the values come back as 1/θ, ascending where θ > 0.
+    // In mode 3 the values come back as 1/θ = λ + s.
     std::vector<a_int> order(converged);
     for (a_int i = 0; i < converged; ++i) order[i] = i;
     std::stable_sort(order.begin(), order.end(), [&](a_int a, a_int b) { return values[a] < values[b]; });
@@ -126,7 +126,7 @@ std::mutex& arpack_mutex() {
 
 }  // namespace
 
-Eigen::MatrixXd lanczos(const ScaledProblem& problem, ElasticInverse& inverse, const Eigen::MatrixXd& found,
+Eigen::MatrixXd lanczos(const ScaledProblem& problem, SpectralInverse& inverse, const Eigen::MatrixXd& found,
                         const Eigen::MatrixXd& mass_times_found, const LanczosOptions& options) {
   assert(options.count >= 1 && options.count < options.subspace && options.subspace <= problem.size());
   Operator apply(inverse, found, mass_times_found);

@@ -1,5 +1,6 @@
 /// @file lanczos.h
-/// The largest eigenvalues of K⁺M by ARPACK's implicitly restarted Lanczos method, in the M inner product.
+/// The modes nearest to −s: the eigenvalues of largest size of P (K + sM)⁻¹ Pᵀ M by ARPACK's implicitly restarted
+/// Lanczos method, in the M inner product.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,9 +18,9 @@ struct LanczosOptions {
 };
 
 /// @param found vectors to look besides, XᵀMX = I; may have no columns. @param mass_times_found M X
-/// @return M-orthonormal vectors, highest 1/λ first. Fewer than `count` if ARPACK did not converge on all.
+/// @return M-orthonormal vectors, ascending λ. Fewer than `count` if ARPACK did not converge on all.
 /// One caller at a time: ARPACK keeps its state in static variables, so calls wait for each other.
-Eigen::MatrixXd lanczos(const ScaledProblem& problem, ElasticInverse& inverse, const Eigen::MatrixXd& found,
+Eigen::MatrixXd lanczos(const ScaledProblem& problem, SpectralInverse& inverse, const Eigen::MatrixXd& found,
                         const Eigen::MatrixXd& mass_times_found, const LanczosOptions& options);
 
 }  // namespace limber::internal

@@ -1,19 +1,17 @@
 #include "limber/precompute/modal_analysis.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <sstream>
 #include <string>
 
 #include "eigen/blas_threads.h"
-#include "eigen/canonical_modes.h"
+#include "eigen/eigen_body.h"
 #include "eigen/elastic_modes.h"
+#include "eigen/join_slices.h"
 #include "eigen/lanczos.h"
-#include "eigen/null_space.h"
 #include "eigen/sparse_operations.h"
 #include "limber/core/error.h"
 #include "limber/precompute/eigenvalue_count.h"
@@ -21,21 +19,24 @@
 namespace limber {
 namespace {
 
+using internal::append_columns;
 using internal::BlasThreads;
 using internal::complete;
+using internal::confirm_zero_modes;
+using internal::dofs_of;
+using internal::EigenBody;
 using internal::EigenPairs;
 using internal::ElasticInverse;
-using internal::find_null_space;
-using internal::lanczos;
+using internal::end_of_cluster;
+using internal::join_slices;
 using internal::LanczosOptions;
 using internal::lowest_modes;
-using internal::make_canonical;
 using internal::make_clusters_canonical;
+using internal::make_eigen_body;
 using internal::multiply;
 using internal::norm_estimate;
 using internal::NullSpace;
 using internal::order_nodes;
-using internal::principal_submatrix;
 using internal::ScaledProblem;
 
 constexpr double kNearlyLoose = 1e-6;
@@ -56,115 +57,7 @@ class Stopwatch {
   Clock::time_point last_ = Clock::now();
 };
 
-/// The body after fixing, in units that make it dimensionless.
-struct Body {
-  std::vector<Index> fixed_nodes, free_nodes;  // ascending
-  NullSpace null_space;                        // on all nodes
-  ScaledProblem problem;                       // on the free nodes
-  double stiffness_unit = 1.0;                 // N/m, a power of two: scaling by it does not round
-  double mass_unit = 1.0;                      // kg, a power of two
-};
-
-std::vector<Index> checked_fixed_nodes(const TetMesh& mesh, std::span<const Index> fixed_nodes) {
-  std::vector<Index> fixed(fixed_nodes.begin(), fixed_nodes.end());
-  std::sort(fixed.begin(), fixed.end());
-  fixed.erase(std::unique(fixed.begin(), fixed.end()), fixed.end());
-  if (!fixed.empty() && (fixed.front() < 0 || static_cast<std::size_t>(fixed.back()) >= mesh.nodes.size()))
-    throw InvalidArgument("analyse_modes: fixed node " +
-                          std::to_string(fixed.front() < 0 ? fixed.front() : fixed.back()) + ", expected 0 to " +
-                          std::to_string(mesh.nodes.size() - 1));
-  return fixed;
-}
-
-void check_body(const TetMesh& mesh) {
-  if (mesh.tets.empty()) throw InvalidArgument("analyse_modes: the mesh has no tetrahedra");
-  std::vector<bool> used(mesh.nodes.size(), false);
-  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
-    for (const Index node : TetNodes(mesh, t)) used[node] = true;
-  const auto unused = std::find(used.begin(), used.end(), false);
-  if (unused != used.end())
-    throw InvalidArgument("analyse_modes: no tetrahedron uses node " + std::to_string(unused - used.begin()) +
-                          "; extract the body first (extract_component)");
-  const auto component = connected_components(mesh);
-  const Index bodies = 1 + *std::max_element(component.begin(), component.end());
-  if (bodies != 1)
-    throw InvalidArgument("analyse_modes: the mesh is " + std::to_string(bodies) +
-                          " bodies, expected one; extract them first (extract_component)");
-}
-
-std::vector<Index> dofs_of(const std::vector<Index>& nodes) {
-  std::vector<Index> dofs;
-  dofs.reserve(3 * nodes.size());
-  for (const Index node : nodes)
-    for (Index axis = 0; axis < 3; ++axis) dofs.push_back(3 * node + axis);
-  return dofs;
-}
-
-/// Divides by a power of two near the mean of the diagonal. @return it
-double scale_to_one(SparseMatrix& A) {
-  double trace = 0.0;
-  for (Index j = 0; j < A.size; ++j)
-    for (Index e = A.column_start[j]; e < A.column_start[j + 1]; ++e)
-      if (A.row[e] == j) trace += A.value[e];
-  const double unit = std::exp2(std::round(std::log2(trace / A.size)));
-  for (double& v : A.value) v /= unit;
-  return unit;
-}
-
-/// K X on the free nodes, in the problem's unit, by way of displacements of all nodes.
-Eigen::MatrixXd stiffness_times(const TetMesh& mesh, std::span<const Material> materials,
-                                const std::vector<Index>& free_dofs, double unit, const Eigen::MatrixXd& X) {
-  Eigen::MatrixXd KX(X.rows(), X.cols());
-  Eigen::VectorXd u = Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(mesh.nodes.size())), f(u.size());
-  for (Eigen::Index c = 0; c < X.cols(); ++c) {
-    u(free_dofs) = X.col(c);
-    elastic_forces(mesh, materials, {u.data(), u.data() + u.size()}, {f.data(), f.data() + f.size()});
-    KX.col(c) = f(free_dofs) / unit;
-  }
-  return KX;
-}
-
-/// Makes NᵀMN = I without mixing a column with later ones, so that the rigid motions stay first. Twice: once leaves an
-/// error of round-off times the condition of NᵀMN.
-void orthonormalise(ScaledProblem& problem) {
-  Eigen::MatrixXd& N = problem.N;
-  for (int pass = 0; pass < 2; ++pass) {
-    for (auto column : N.colwise()) column /= std::sqrt(column.dot(problem.mass_times(column).col(0)));
-    const Eigen::MatrixXd gram = N.transpose() * problem.mass_times(N);
-    Eigen::LLT<Eigen::MatrixXd>(gram).matrixU().solveInPlace<Eigen::OnTheRight>(N);
-  }
-  problem.MN = problem.mass_times(N);
-}
-
-Body make_body(const TetMesh& mesh, std::span<const Material> materials, std::span<const Index> fixed_nodes,
-               MassKind mass, Jobs& jobs) {
-  check_body(mesh);
-  Body body;
-  body.fixed_nodes = checked_fixed_nodes(mesh, fixed_nodes);
-  std::vector<Index> all(mesh.nodes.size());
-  std::iota(all.begin(), all.end(), 0);
-  std::set_difference(all.begin(), all.end(), body.fixed_nodes.begin(), body.fixed_nodes.end(),
-                      std::back_inserter(body.free_nodes));
-  body.null_space = find_null_space(mesh, body.fixed_nodes);
-  if (body.free_nodes.empty()) return body;
-
-  const std::vector<Index> free_dofs = dofs_of(body.free_nodes);
-  ScaledProblem& p = body.problem;
-  p.K = principal_submatrix(assemble_stiffness(mesh, materials, jobs), free_dofs);
-  p.node_mass = principal_submatrix(assemble_mass(mesh, materials, mass, jobs), body.free_nodes);
-  body.stiffness_unit = scale_to_one(p.K);
-  body.mass_unit = scale_to_one(p.node_mass);
-  p.stiffness_times = [&mesh, materials, free_dofs, unit = body.stiffness_unit](const Eigen::MatrixXd& X) {
-    return stiffness_times(mesh, materials, free_dofs, unit, X);
-  };
-  p.N = body.null_space.basis(free_dofs, Eigen::all);
-  orthonormalise(p);
-  make_canonical(p.N.rightCols(body.null_space.mechanisms));
-  p.MN = p.mass_times(p.N);
-  return body;
-}
-
-void describe_freedom(const Body& body, ModalAnalysis& analysis, Warnings& warnings) {
+void describe_freedom(const EigenBody& body, ModalAnalysis& analysis, Warnings& warnings) {
   const NullSpace& space = body.null_space;
   analysis.freedom.motion = space.rigid.motion;
   analysis.freedom.pivot = space.rigid.pivot;
@@ -181,27 +74,6 @@ void describe_freedom(const Body& body, ModalAnalysis& analysis, Warnings& warni
         "the joints between parts or the fixed nodes are nearly in line: a motion that they should hold is "
         "held only weakly, and its frequency is uncertain");
   if (body.free_nodes.empty()) warnings.push_back("every node is fixed: the body has no modes");
-}
-
-/// The zero modes are as many as geometry says: none but those of N lies below half the first elastic eigenvalue. Where
-/// round-off makes K resist even N by as much as that, there is nothing to see, and the caller is told.
-void confirm_zero_modes(const ScaledProblem& problem, const EigenPairs& pairs, EigenvalueCounter& counter,
-                        Warnings& warnings) {
-  const double sigma = pairs.lambda[0] / 2.0;
-  const double round_off = (problem.N.transpose() * multiply(problem.K, problem.N)).norm();
-  if (round_off > sigma / 10.0) {
-    warnings.push_back(
-        "the lowest frequencies lie within round-off of the stiffness matrix, so the number of zero modes is known "
-        "from "
-        "geometry alone");
-    return;
-  }
-  const int counted = counter.below(sigma);
-  if (counted != problem.N.cols())
-    throw ComputationError("the body's geometry allows " + std::to_string(problem.N.cols()) +
-                           " motions without deformation, but its stiffness matrix has " + std::to_string(counted) +
-                           " eigenvalues near zero: look for tetrahedra that are nearly flat, or materials whose "
-                           "stiffnesses differ by more than about 1e10");
 }
 
 void measure_residuals(const ScaledProblem& problem, const EigenPairs& pairs, ModalAnalysis& analysis) {
@@ -232,23 +104,11 @@ double orthogonality_error(const ScaledProblem& problem, const EigenPairs& pairs
   return gram.size() == 0 ? 0.0 : (gram - Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).cwiseAbs().maxCoeff();
 }
 
-/// Writes columns over the free nodes, times a unit, behind what `all` holds, with zeros at the fixed nodes.
-void append_columns(const Body& body, Index nodes, const Eigen::Ref<const Eigen::MatrixXd>& columns, double unit,
-                    std::vector<double>& all) {
-  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
-    const std::size_t start = all.size();
-    all.resize(start + 3 * static_cast<std::size_t>(nodes), 0.0);
-    for (std::size_t i = 0; i < body.free_nodes.size(); ++i)
-      for (int axis = 0; axis < 3; ++axis) all[start + 3 * body.free_nodes[i] + axis] = unit * columns(3 * i + axis, c);
-  }
-}
-
-void write_modes(const Body& body, const EigenPairs& pairs, ModalAnalysis& analysis) {
+void write_modes(const EigenBody& body, const EigenPairs& pairs, ModalAnalysis& analysis) {
   const auto mechanisms = body.problem.N.rightCols(body.null_space.mechanisms);
   const auto mass_times_mechanisms = body.problem.MN.rightCols(body.null_space.mechanisms);
   analysis.eigenvalues.assign(body.null_space.mechanisms, 0.0);
-  for (const double lambda : pairs.lambda)
-    analysis.eigenvalues.push_back(lambda * (body.stiffness_unit / body.mass_unit));
+  for (const double lambda : pairs.lambda) analysis.eigenvalues.push_back(lambda * body.eigenvalue_unit());
   const double root = std::sqrt(body.mass_unit);
   append_columns(body, analysis.nodes, mechanisms, 1.0 / root, analysis.shapes);
   append_columns(body, analysis.nodes, pairs.W, 1.0 / root, analysis.shapes);
@@ -256,17 +116,18 @@ void write_modes(const Body& body, const EigenPairs& pairs, ModalAnalysis& analy
   append_columns(body, analysis.nodes, pairs.MW, root, analysis.mass_times_shapes);
 }
 
-void warn_of_shortfalls(const ModalAnalysis& analysis, const ModalAnalysisOptions& options, Eigen::Index elastic,
-                        double shift, Warnings& warnings) {
-  if (elastic < options.modes)
-    warnings.push_back(std::to_string(options.modes) + " modes were asked for, but the mesh has only " +
+void warn_of_residuals(const ModalAnalysis& analysis, Warnings& warnings) {
+  if (analysis.accuracy.residual_max <= analysis.accuracy.residual_bound) return;
+  std::ostringstream text;
+  text << "a mode's residual, " << analysis.accuracy.residual_max << " of its inertia force, exceeds "
+       << analysis.accuracy.residual_bound;
+  warnings.push_back(text.str());
+}
+
+void warn_of_shortfalls(int wanted, Eigen::Index elastic, double shift, Warnings& warnings) {
+  if (elastic < wanted)
+    warnings.push_back(std::to_string(wanted) + " modes were asked for, but the mesh has only " +
                        std::to_string(elastic) + " elastic ones");
-  if (analysis.accuracy.residual_max > analysis.accuracy.residual_bound) {
-    std::ostringstream text;
-    text << "a mode's residual, " << analysis.accuracy.residual_max << " of its inertia force, exceeds "
-         << analysis.accuracy.residual_bound;
-    warnings.push_back(text.str());
-  }
   if (shift > 0.0)
     warnings.push_back(
         "the body is so near to a mechanism that its stiffness had to be shifted to be factored: the "
@@ -282,9 +143,9 @@ LanczosOptions lanczos_options(const ModalAnalysisOptions& options) {
 /// A body and the factor that refers to it, at one place in memory for as long as either is used.
 class FactoredBody final : public ElasticCompliance {
  public:
-  FactoredBody(Body body, Index nodes) : body_(std::move(body)), nodes_(nodes) {}
+  FactoredBody(EigenBody body, Index nodes) : body_(std::move(body)), nodes_(nodes) {}
 
-  const Body& body() const { return body_; }
+  const EigenBody& body() const { return body_; }
   ElasticInverse& factor(const std::vector<Index>& order) { return inverse_.emplace(body_.problem, order); }
 
   std::vector<double> displacements(std::span<const double> forces) override {
@@ -309,7 +170,7 @@ class FactoredBody final : public ElasticCompliance {
     return all;
   }
 
-  Body body_;
+  EigenBody body_;
   Index nodes_;
   std::optional<ElasticInverse> inverse_;
 };
@@ -326,6 +187,41 @@ void ModalAnalysisOptions::validate() const {
                           ", expected 0 or more");
 }
 
+namespace {
+
+/// The lowest modes by Lanczos, as many as are wanted.
+EigenPairs compute_modes(const EigenBody& body, ElasticInverse& inverse, const std::vector<Index>& order,
+                         const ModalAnalysisOptions& wanted, ModalAnalysis& analysis, Stopwatch& watch,
+                         Warnings& warnings) {
+  Eigen::Index kept = 0;
+  EigenPairs pairs = lowest_modes(body.problem, inverse, wanted.modes, lanczos_options(wanted), kept);
+  watch.lap(analysis.seconds.iterate);
+  if (wanted.certify) {
+    EigenvalueCounter counter(body.problem.K, body.problem.node_mass, order);
+    complete(body.problem, inverse, counter, pairs, wanted.modes, kept);
+    confirm_zero_modes(body.problem, pairs, counter, warnings);
+    analysis.accuracy.certified = true;
+  }
+  watch.lap(analysis.seconds.certify);
+  pairs.keep_first(kept);
+  warn_of_shortfalls(wanted.modes, kept, inverse.shift(), warnings);
+  return pairs;
+}
+
+/// The lowest modes that the slices hold, as many as are wanted.
+EigenPairs modes_of_slices(const EigenBody& body, const ModalAnalysisOptions& wanted, ModalAnalysis& analysis,
+                           Stopwatch& watch) {
+  EigenPairs pairs = join_slices(body, wanted.slices);
+  const Eigen::Index count = pairs.count();
+  const Eigen::Index end = end_of_cluster(pairs.lambda, std::min<Eigen::Index>(wanted.modes, count), count);
+  pairs.keep_first(end);
+  analysis.accuracy.certified = true;  // by the slices' counts
+  watch.lap(analysis.seconds.iterate);
+  return pairs;
+}
+
+}  // namespace
+
 ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> materials,
                             std::span<const Index> fixed_nodes, const ModalAnalysisOptions& options, Warnings& warnings,
                             Jobs& jobs) {
@@ -336,8 +232,8 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
   Stopwatch watch;
 
   const auto factored =
-      std::make_shared<FactoredBody>(make_body(mesh, materials, fixed_nodes, options.mass, jobs), analysis.nodes);
-  const Body& body = factored->body();
+      std::make_shared<FactoredBody>(make_eigen_body(mesh, materials, fixed_nodes, options.mass, jobs), analysis.nodes);
+  const EigenBody& body = factored->body();
   describe_freedom(body, analysis, warnings);
   watch.lap(analysis.seconds.assemble);
   if (body.free_nodes.empty()) {
@@ -347,36 +243,26 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
 
   const std::vector<Index> order = order_nodes(body.problem.K);
   watch.lap(analysis.seconds.order);
-  ElasticInverse& inverse = factored->factor(order);
+  const bool sliced = !options.slices.empty();
+  ElasticInverse* inverse = !sliced || options.keep_compliance ? &factored->factor(order) : nullptr;
   watch.lap(analysis.seconds.factor);
 
   ModalAnalysisOptions wanted = options;
   if (std::isfinite(options.below)) {
     EigenvalueCounter counter(body.problem.K, body.problem.node_mass, order);
-    const int zeros = static_cast<int>(body.problem.N.cols());
-    analysis.elastic_below = counter.below(options.below * (body.mass_unit / body.stiffness_unit)) - zeros;
+    analysis.elastic_below = counter.below(options.below / body.eigenvalue_unit()) - analysis.freedom.zero_modes();
     wanted.modes = std::min(options.modes, analysis.elastic_below);
     watch.lap(analysis.seconds.certify);
   }
 
-  Eigen::Index kept = 0;
-  EigenPairs pairs = lowest_modes(body.problem, inverse, wanted.modes, lanczos_options(options), kept);
-  watch.lap(analysis.seconds.iterate);
-  if (options.certify) {
-    EigenvalueCounter counter(body.problem.K, body.problem.node_mass, order);
-    complete(body.problem, inverse, counter, pairs, wanted.modes, kept);
-    confirm_zero_modes(body.problem, pairs, counter, warnings);
-    analysis.accuracy.certified = true;
-  }
-  watch.lap(analysis.seconds.certify);
-
-  pairs.keep_first(kept);
+  EigenPairs pairs = sliced ? modes_of_slices(body, wanted, analysis, watch)
+                            : compute_modes(body, *inverse, order, wanted, analysis, watch, warnings);
   make_clusters_canonical(pairs);
   measure_residuals(body.problem, pairs, analysis);
+  warn_of_residuals(analysis, warnings);
   analysis.accuracy.orthogonality_max = orthogonality_error(body.problem, pairs);
-  analysis.solves = inverse.solves();
+  analysis.solves = inverse ? inverse->solves() : 0;
   write_modes(body, pairs, analysis);
-  warn_of_shortfalls(analysis, wanted, kept, inverse.shift(), warnings);
   if (options.keep_compliance) analysis.compliance = factored;
   watch.lap(analysis.seconds.iterate);
   return analysis;

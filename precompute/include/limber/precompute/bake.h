@@ -248,4 +248,9 @@ struct BakeResult {
 /// @throws InvalidArgument (options), InputError (mesh and materials do not fit), ComputationError
 BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& warnings, Jobs& jobs = serial_jobs());
 
+/// The modes of a band alone, one slice for each body, for ModalAnalysisOptions::slices of a bake of the same input.
+/// @throws as bake()
+std::vector<SpectrumSlice> bake_slices(const BakeInput& input, const BakeOptions& options, const FrequencyBand& band,
+                                       Warnings& warnings, Jobs& jobs = serial_jobs());
+
 }  // namespace limber

@@ -11,6 +11,9 @@
 #include "limber/precompute/sparse_matrix.h"
 
 namespace limber {
+namespace internal {
+class IndefiniteFactor;
+}
 
 /// Counts for several σ share one symbolic factorisation.
 class EigenvalueCounter {
@@ -27,10 +30,9 @@ class EigenvalueCounter {
   int below(double sigma);
 
  private:
-  struct Mumps;
-  std::unique_ptr<Mumps> mumps_;
   const SparseMatrix& K_;
   const SparseMatrix& node_mass_;
+  std::unique_ptr<internal::IndefiniteFactor> factor_;
 };
 
 }  // namespace limber

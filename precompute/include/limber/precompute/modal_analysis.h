@@ -21,6 +21,7 @@
 #include "limber/model/modal_model.h"
 #include "limber/precompute/elastic_compliance.h"
 #include "limber/precompute/fem.h"
+#include "limber/precompute/spectrum_slice.h"
 
 namespace limber {
 
@@ -34,6 +35,8 @@ struct ModalAnalysisOptions {
   /// thousands of nodes on a quiet machine; on a busy one their waiting can cost twenty times what they save. The last
   /// bits of the modes depend on it.
   int blas_threads = 1;
+  /// Where there are any, modes are theirs: those of this body, none missing from 0 Hz on.
+  std::vector<SpectrumSlice> slices = {};
   std::uint64_t seed = 0;  ///< of Lanczos's start vector: modes agree for all seeds to about 1e-6, bits do not
   void validate() const;
 };
@@ -83,5 +86,12 @@ struct ModalAnalysis {
 ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> materials,
                             std::span<const Index> fixed_nodes, const ModalAnalysisOptions& options, Warnings& warnings,
                             Jobs& jobs = serial_jobs());
+
+/// The modes of a band, for ModalAnalysisOptions::slices. @param options all but modes, below, slices and
+/// keep_compliance count
+/// @throws ComputationError as above, or if an end of the band is an eigenvalue
+SpectrumSlice analyse_slice(const TetMesh& mesh, std::span<const Material> materials,
+                            std::span<const Index> fixed_nodes, const FrequencyBand& band,
+                            const ModalAnalysisOptions& options, Warnings& warnings, Jobs& jobs = serial_jobs());
 
 }  // namespace limber
