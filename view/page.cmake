@@ -35,7 +35,7 @@ ExternalProject_Add(limber_page_engine
     -DCMAKE_TOOLCHAIN_FILE=${emscripten_root}/cmake/Modules/Platform/Emscripten.cmake -DCMAKE_BUILD_TYPE=Release
     "-DCMAKE_CXX_FLAGS_RELEASE=-O3 -DNDEBUG" -DEigen3_DIR=${Eigen3_DIR} -DLIMBER_PAGE_HEADERS=${page_headers}
     -DLIMBER_WARNINGS_AS_ERRORS=OFF
-  BUILD_COMMAND ${with_node_path} ${CMAKE_COMMAND} --build <BINARY_DIR> --target page_engine page_sound
+  BUILD_COMMAND ${with_node_path} ${CMAKE_COMMAND} --build <BINARY_DIR> --target page_engine page_sound limber_npm
   BUILD_BYPRODUCTS ${page_engine}/page_engine.mjs ${page_engine}/page_engine.wasm ${page_engine}/page_sound.wasm
   INSTALL_COMMAND ""
   BUILD_ALWAYS ON

@@ -20,7 +20,7 @@ export async function until(holds) {
   return true;
 }
 
-const browser = await chromium.launchPersistentContext(join(folder, 'profile'), {
+export const browser = await chromium.launchPersistentContext(join(folder, 'profile'), {
   executablePath: process.env.CHROMIUM ?? execFileSync('sh', ['-c', 'command -v chromium']).toString().trim(),
   headless: true,
   timeout: patience,

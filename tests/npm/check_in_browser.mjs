@@ -1,0 +1,45 @@
+// node check_in_browser.mjs FOLDER: the package, installed in FOLDER, in headless Chromium: by a plain <script type="module"> and from
+// a bundle. Its scenes end in the bits of Node.
+import { readFile } from 'node:fs/promises';
+import { createServer } from 'node:http';
+import { join } from 'node:path';
+import { pathToFileURL } from 'node:url';
+import esbuild from 'esbuild';
+import { browser, check, run, until, wrong } from './browser.mjs';
+
+const folder = process.argv[2], types = { js: 'text/javascript', mjs: 'text/javascript', wasm: 'application/wasm', html: 'text/html' };
+const play = 'document.title = JSON.stringify(scenes(limber));';
+const { outputFiles } = await esbuild.build({
+  stdin: {
+    contents: `import * as limber from 'limber'; import wasm from 'limber/limber.wasm'; import { scenes } from './scenes.mjs';
+      await limber.load(new URL(wasm, import.meta.url)); ${play}`,
+    resolveDir: folder,
+  },
+  bundle: true, minify: true, write: false, format: 'esm', target: 'es2022', platform: 'browser', outdir: '/bundle',
+  loader: { '.wasm': 'file' }, assetNames: '[name]',
+});
+const made = {
+  '/plain.html': `<!doctype html><script type="module">import * as limber from './node_modules/limber/limber.js';
+    import { scenes } from './scenes.mjs'; await limber.load(); ${play}</script>`,
+  '/bundled.html': '<!doctype html><script type="module" src="bundle/stdin.js"></script>',
+  '/favicon.ico': '',
+  ...Object.fromEntries(outputFiles.map(({ path, contents }) => [path, contents])),
+};
+const server = createServer(async ({ url }, response) => {
+  const bytes = made[url] ?? await readFile(join(folder, url)).catch(() => undefined);
+  response.writeHead(bytes === undefined ? 404 : 200, { 'Content-Type': types[url.split('.').pop()] ?? 'text/plain' }).end(bytes);
+}).listen(0, '127.0.0.1');
+
+await run('check_in_browser', folder, async () => {
+  const [limber, { scenes }] = await Promise.all(['node_modules/limber/node.js', 'scenes.mjs'].map((path) => import(pathToFileURL(join(folder, path)).href)));
+  await limber.load();
+  const expected = JSON.stringify(scenes(limber));
+  for (const name of ['plain', 'bundled']) {
+    const page = await browser.newPage();
+    page.on('console', (message) => { if (message.type() === 'error') wrong.push(`${name}: console: ${message.text()}`); });
+    page.on('pageerror', (error) => wrong.push(`${name}: ${error.message}`));
+    await page.goto(`http://127.0.0.1:${server.address().port}/${name}.html`);
+    await until(async () => wrong.length > 0 || (await page.title()) !== '');
+    check((await page.title()) === expected, `${name}: the scenes end as in Node: ${await page.title()}, ${expected}`);
+  }
+});
