@@ -263,20 +263,20 @@ HWY_ATTR bool FirstExit(const FieldQuery& query, const float* from, const float*
   const float length = hn::GetLane(ways.Length());
   const int points = std::clamp(static_cast<int>(length / step) + 2, 2, 96);
   const F part = All(1.0f / static_cast<float>(points - 1));
-  // Each vector of points begins where the last one ended.
-  for (int first = 0; first + 1 < points; first += static_cast<int>(kLanes) - 1) {
-    HWY_ALIGN float values[kLanes];
+  float values[kLanes + 1] = {};  // the last of the vector of points before, then these
+  for (int first = 0; first < points; first += static_cast<int>(kLanes)) {
     const F along = hn::Mul(hn::Iota(d, static_cast<float>(first)), part);
-    hn::Store(DistanceOf(query.field, ways.Rest(along)).value, d, values);
-    for (int i = 0; i + 1 < static_cast<int>(kLanes); ++i) {
+    hn::StoreU(DistanceOf(query.field, ways.Rest(along)).value, d, values + 1);
+    for (int i = first == 0 ? 1 : 0; i < static_cast<int>(kLanes); ++i) {
       if ((values[i] < 0.0f) == (values[i + 1] < 0.0f)) continue;
-      const F at = hn::Mul(All(static_cast<float>(first + i) + values[i] / (values[i] - values[i + 1])), part);
+      const F at = hn::Mul(All(static_cast<float>(first + i - 1) + values[i] / (values[i] - values[i + 1])), part);
       const Points r = ways.Rest(at);
       Lanes lanes;
       lanes.Store(ways.At(at), r, DistanceOf(query.field, r));
       *exit = lanes.Hit(0, 0, hn::GetLane(at));
       return exit->along <= 1.0f;
     }
+    values[0] = values[kLanes];
   }
   return false;
 }
