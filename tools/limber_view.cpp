@@ -4,6 +4,7 @@
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -123,6 +124,24 @@ PageContent content_of(Program& program, const Arguments& arguments) {
   return page_of_assembly(input, arguments.bake);
 }
 
+/// gzip's bytes (RFC 1952), which every browser reads.
+std::string gzipped(std::string_view bytes) {
+  z_stream stream{};
+  constexpr int kGzip = 15 + 16;
+  if (deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, kGzip, 9, Z_DEFAULT_STRATEGY) != Z_OK)
+    throw ComputationError("limber-view: zlib has no memory");
+  std::string out(deflateBound(&stream, bytes.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  const int ended = deflate(&stream, Z_FINISH);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  if (ended != Z_STREAM_END) throw ComputationError("limber-view: zlib cannot compress a file of the page");
+  return out;
+}
+
 fs::path temporary_page(const fs::path& input) { return temporary_folder() / (input.stem().string() + ".html"); }
 
 /// @return whether the desktop took it
@@ -131,7 +150,7 @@ bool opened(const std::string& page) { return exit_code_of("xdg-open", {page}) =
 void view(Program& program, const Arguments& arguments) {
   program.add_input(arguments.input);
   const PageContent content = content_of(program, arguments);
-  const std::string page = page_with(empty_page(), content);
+  const std::string page = page_with(empty_page(), content, gzipped);
   program.report()["files"] = content.files.size();
   program.report()["bytes"] = page.size();
   if (!arguments.page.empty()) {

@@ -235,22 +235,24 @@ class BodyReader {
     const JsonObject primitive(primitives[0], mesh_.where("primitives") + "[0]");
     const JsonObject attributes(primitive.at("attributes"), primitive.where("attributes"));
     data_.render.rest = items_of<Vec3f>(vectors(attributes, "POSITION", vertices));
-    (void)vectors(attributes, "NORMAL", vertices);
+    const bool normals = attributes.has("NORMAL");
+    if (normals) (void)vectors(attributes, "NORMAL", vertices);
     attributes.finish();
     data_.render.triangles = items_of<Triangle>(pieces_.accessor(primitive, "indices", internal::kUint32, "SCALAR",
                                                                  3 * triangles, sizeof(Triangle) * triangles));
-    read_targets(primitive, vertices);
+    read_targets(primitive, vertices, normals);
     (void)primitive.has("material");
     primitive.finish();
   }
 
-  void read_targets(const JsonObject& primitive, std::size_t vertices) {
+  void read_targets(const JsonObject& primitive, std::size_t vertices, bool normals) {
     std::vector<std::string_view> targets;
     if (primitive.has("targets"))
       primitive.for_each("targets", [&](const json& value, const std::string& where) {
         const JsonObject target(value, where);
         targets.push_back(vectors(target, "POSITION", vertices));
-        if (modes_ <= static_cast<std::size_t>(kMaxTargetsWithNormals)) (void)vectors(target, "NORMAL", vertices);
+        if (normals && modes_ <= static_cast<std::size_t>(kMaxTargetsWithNormals))
+          (void)vectors(target, "NORMAL", vertices);
         target.finish();
       });
     if (targets.size() != modes_)

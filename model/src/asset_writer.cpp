@@ -8,6 +8,7 @@
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/model/asset.h"
+#include "limber/model/asset_without_normals.h"
 #include "limber/model/glb.h"
 #include "limber/model/morph_targets.h"
 
@@ -158,19 +159,19 @@ std::string extras_for_people(const ModalModel& model) {
 }
 
 /// The render surface with its modes as morph targets. @return the mesh, but for extras and extensions
-GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, int material) {
+GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, int material, bool normals) {
   const ModalSurface& surface = model.render();
   const std::vector<float> rest = rest_positions(surface);
   GlbMesh mesh{.name = model.name(), .material = material};
   mesh.position = glb.add_vertex_vectors(rest);
-  mesh.normal = glb.add_vertex_vectors(unit_normals(rest, surface.triangles));
+  if (normals) mesh.normal = glb.add_vertex_vectors(unit_normals(rest, surface.triangles));
   mesh.triangles = glb.add_triangles(surface.triangles);
   for (Index i = 0; i < model.modes(); ++i) {
     const std::vector<float> moved =
         mode_displacements(surface, i, model.data().mode_scales[static_cast<std::size_t>(i)]);
     GlbMorphTarget target{.name = mode_target_name(i, model.modes(), model.frequency_hz(i))};
     target.position = glb.add_vertex_vectors(moved);
-    if (model.modes() <= kMaxTargetsWithNormals)
+    if (normals && model.modes() <= kMaxTargetsWithNormals)
       target.normal = glb.add_vertex_vectors(normal_changes(rest, moved, surface.triangles));
     mesh.targets.push_back(std::move(target));
   }
@@ -178,9 +179,9 @@ GlbMesh surface_mesh(GlbBuilder& glb, const ModalModel& model, int material) {
 }
 
 void add_body(GlbBuilder& glb, const ModalModel& model, const std::vector<double>& frequency_errors,
-              const SoundModes* sound, int material, ContentHash& hash) {
+              const SoundModes* sound, int material, bool normals, ContentHash& hash) {
   const ModalModelData& body = model.data();
-  GlbMesh mesh = surface_mesh(glb, model, material);
+  GlbMesh mesh = surface_mesh(glb, model, material, normals);
   json block = body_block(body);
   if (body.collision) block["collision"] = collision_block(glb, *body.collision);
   if (body.volume_block) block["volume_block"] = volume_block(glb, *body.volume_block);
@@ -271,9 +272,7 @@ json add_machine(const Asset& asset, ContentHash& hash) {
   return block;
 }
 
-}  // namespace
-
-std::string asset_bytes(const Asset& asset) {
+std::string bytes_of(const Asset& asset, bool normals) {
   check(asset);
   const Provenance provenance = utf8(asset.provenance);
   GlbBuilder glb;
@@ -283,7 +282,7 @@ std::string asset_bytes(const Asset& asset) {
       {.name = "limber", .base_color = {0.62f, 0.70f, 0.78f, 1.0f}, .roughness = 0.55f, .double_sided = true});
   for (std::size_t i = 0; i < asset.bodies.size(); ++i)
     add_body(glb, *asset.bodies[i], asset.frequency_errors.empty() ? std::vector<double>() : asset.frequency_errors[i],
-             asset.sound(i), material, hash);
+             asset.sound(i), material, normals, hash);
   json block = {{"version", asset_format::kFormatVersion},
                 {"provenance",
                  {{"tool", provenance.tool},
@@ -295,6 +294,12 @@ std::string asset_bytes(const Asset& asset) {
   glb.set_extension(asset_format::kExtension, block.dump());
   return glb.bytes();
 }
+
+}  // namespace
+
+std::string asset_bytes(const Asset& asset) { return bytes_of(asset, true); }
+
+std::string asset_bytes_without_normals(const Asset& asset) { return bytes_of(asset, false); }
 
 void write_asset(const std::filesystem::path& path, const Asset& asset) { write_file(path, asset_bytes(asset)); }
 

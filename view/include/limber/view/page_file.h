@@ -6,6 +6,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,7 +28,8 @@ struct PageContent {
   std::string joints{};  ///< of a model to be posed: path of its joints file
 };
 
-/// A scene with its assets and the files of its shapes, which get names of our own. Reads and checks all of it.
+/// A scene with its assets and the files of its shapes, which get names of our own. Reads and checks all of it. Shapes
+/// of modes are rounded to 16 bits, here and below.
 /// @throws InputError as read_scene() and load_models()
 PageContent page_of_scene(const std::filesystem::path& scene);
 
@@ -44,8 +46,10 @@ PageContent page_of_asset(const std::filesystem::path& asset, UpAxis up = UpAxis
 PageContent page_of_pose(const GroupedSurface& surface, const JointsFile& joints, const std::string& name,
                          const std::string& joints_name);
 
-/// @param empty the page without a scene, which limber-view has inside
+/// @param empty the page without a scene, which limber-view has inside. @param compress makes gzip's bytes of others;
+/// without it files stay as large as they are
 /// @throws InvalidArgument where `empty` has no place for files
-std::string page_with(std::string_view empty, const PageContent& content);
+std::string page_with(std::string_view empty, const PageContent& content,
+                      const std::function<std::string(std::string_view)>& compress = {});
 
 }  // namespace limber
