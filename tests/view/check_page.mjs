@@ -75,6 +75,29 @@ async function isSaved(page) {
   check((await hash(page)) === before, 'saving changes nothing');
 }
 
+/** A page that was shared goes on from where the other stood, in its own file, seen from the same side. */
+async function isShared(page) {
+  await fromTheStart(page);
+  await steps(page, 30);
+  await page.evaluate(() => globalThis.limber.drop(0));
+  const look = (page) => page.evaluate(() => {
+    const { camera, controls } = globalThis.limber.stage;
+    return { eye: camera.position.toArray(), target: controls.target.toArray(), bodies: globalThis.limber.engine.scene.bodies.length };
+  });
+  await steps(page, 5);
+  const before = await hash(page), seen = await look(page);
+  const [download] = await Promise.all([page.waitForEvent('download'), page.locator('#panel button:has-text("Share")').click()]);
+  const shared = join(folder, 'shared.html');
+  await download.saveAs(shared);
+  const other = await open(shared), there = await look(other);
+  check((await hash(other)) === before, 'a shared page stands as the other stood');
+  check(there.bodies === seen.bodies && distance(there.eye, seen.eye) < 1e-9 && distance(there.target, seen.target) < 1e-9, 'seen from the same side, with what was dropped');
+  check(!(await other.evaluate(() => globalThis.limber.playing)), 'it waits as the other did');
+  const next = await steps(page, 10), following = await steps(other, 10);
+  check(next.every((value, i) => value === following[i]), 'the same follows');
+  await other.close();
+}
+
 async function goesBack(page) {
   await fromTheStart(page);
   const first = await steps(page, 25), start = await hash(page);
@@ -314,7 +337,7 @@ async function tellsOfABrokenDownload() {
 
 async function tellsOfDamage() {
   const text = readFileSync(file, 'utf8'), begin = text.indexOf('<script type="application/json" id="files">');
-  const asset = text.indexOf('"base64":"', begin) + 10;
+  const asset = text.indexOf('"packed":"', begin) + 10;
   const damaged = join(folder, 'damaged.html');
   writeFileSync(damaged, text.slice(0, asset + 400) + (text[asset + 400] === 'A' ? 'B' : 'A') + text.slice(asset + 401));
   const page = await open(damaged);
@@ -372,6 +395,7 @@ await run('check_page', file, async () => {
     await tellsTheStages(page);
     await goesBack(page);
     await isSaved(page);
+    await isShared(page);
     if (picture !== undefined) {
       await fromTheStart(page);
       await steps(page, 60);

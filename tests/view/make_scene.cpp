@@ -81,6 +81,22 @@ void write_sounding_scene(const std::filesystem::path& folder) {
     "assets": {"bar": "bar.glb"}, "bodies": [{"name": "bar", "asset": "bar", "position": [0, 0, 1.2]}]})");
 }
 
+/// A post that stands and a block hinged to it at its side, at the height of its middle.
+limber::Asset machine() {
+  limber::ModalModelData post = limber::testing::block_data(2, "<b>post</b>"),
+                         arm = limber::testing::block_data(3, "arm");
+  post.origin_in_input = limber::Vec3::Zero(), arm.origin_in_input = {2.1, 0, 0};
+  limber::Asset asset;
+  for (limber::ModalModelData* data : {&post, &arm})
+    asset.bodies.push_back(std::make_shared<const limber::ModalModel>(std::move(*data)));
+  limber::JointSpec hinge{.type = limber::JointType::kRevolute, .frame = {.origin = {1.05, 0, 0.5}}};
+  hinge.frame.axes << 0, 0, 1, 1, 0, 0, 0, 1, 0;  // about y
+  hinge.limits.rotation = {-1.5, 1.0};
+  asset.joints = {{.a = 0, .b = 1, .spec = hinge},
+                  {.b = 0, .spec = {.type = limber::JointType::kFixed}, .patch_radius = 2.0}};
+  return asset;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -90,6 +106,7 @@ int main(int argc, char** argv) {
   limber::ModalModelData data = limber::testing::block_data(4, "<img src=x onerror=alert(1)>");
   limber::write_asset(folder / "block.glb",
                       {.bodies = {std::make_shared<const limber::ModalModel>(std::move(data))}, .provenance = {}});
+  limber::write_asset(folder / "machine.glb", machine());
   limber::write_file(folder / "markup.json", R"({"step": 0.016666666666666666, "duration": 60, "contact": {},
     "assets": {"</script>": "block.glb"},
     "statics": [{"name": "<b>ground</b>", "shape": {"half_space": {}}},

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "block_model.h"
@@ -86,20 +87,51 @@ Asset hinged_blocks(bool tied) {
   return asset;
 }
 
+Scene scene_of(const Asset& asset, const Folder& folder) {
+  write_asset(folder.path / "asset.glb", asset);
+  write_file(folder.path / "s.json", page_of_asset(folder.path / "asset.glb").files[1].bytes);
+  return read_scene(folder.path / "s.json");
+}
+
 TEST(PageFile, AMachineStandsAsDrawnOrFallsAsAWhole) {
   const Folder folder("page_file_machine");
   for (const bool tied : {true, false}) {
-    write_asset(folder.path / "asset.glb", hinged_blocks(tied));
-    const PageContent content = page_of_asset(folder.path / "asset.glb");
-    write_file(folder.path / "s.json", content.files[1].bytes);
-    const Scene scene = read_scene(folder.path / "s.json");
+    const Scene scene = scene_of(hinged_blocks(tied), folder);
     ASSERT_EQ(scene.bodies.size(), 2u);
     ASSERT_EQ(scene.joints.size(), tied ? 2u : 1u);
     EXPECT_NEAR((scene.bodies[1].placement.pose.p - scene.bodies[0].placement.pose.p - Vec3(3, 0, 0)).norm(), 0.0,
                 1e-12);
-    EXPECT_NEAR(scene.bodies[0].placement.pose.p.z(), tied ? 0.0 : 1.0, 1e-6) << "falls from half its height";
-    EXPECT_EQ(scene.contacts.options.has_value(), !tied);
+    EXPECT_NEAR(scene.bodies[0].placement.pose.p.z(), tied ? 0.5 : 1.0, 1e-6) << "on the ground, or half its height";
+    EXPECT_TRUE(scene.contacts.options.has_value());
+    EXPECT_EQ(scene.statics.size(), 1u);
   }
+}
+
+/// A hinge holds the weight of what hangs on it, however far it sticks out; one in free fall holds nothing.
+TEST(PageFile, FrictionInAMachinesJointsHoldsIt) {
+  const Folder folder("page_file_friction");
+  const Scene tied = scene_of(hinged_blocks(true), folder);
+  ASSERT_EQ(tied.joints[0].coordinates.size(), 1u);
+  const double arm = 1.5;  // m, from the hinge to the centre of the block that hangs on it
+  EXPECT_NEAR(tied.joints[0].coordinates[0].friction, 9.80665 * testing::kBlockMass * arm, 1e-9);
+  EXPECT_TRUE(scene_of(hinged_blocks(false), folder).joints[0].coordinates.empty());
+  Asset oiled = hinged_blocks(true);
+  oiled.joints[0].coordinates = {{.friction = 0.25}};
+  EXPECT_EQ(scene_of(oiled, folder).joints[0].coordinates[0].friction, 0.25) << "the asset's own";
+}
+
+/// On the first hinge of an arm of two links hangs all of it, stretched out though it is drawn folded.
+TEST(PageFile, FrictionReckonsWithAnArmStretchedOut) {
+  const Folder folder("page_file_stretched");
+  Asset asset = hinged_blocks(true);
+  ModalModelData last = testing::block_data(0, "last");
+  last.origin_in_input = {3, 2, 0};
+  asset.bodies.push_back(std::make_shared<const ModalModel>(std::move(last)));
+  asset.joints.push_back({.a = 1, .b = 2, .spec = {.type = JointType::kRevolute, .frame = {.origin = {4, 0, 0}}}});
+  const Scene scene = scene_of(asset, folder);
+  const double link = 2.5, beyond = std::sqrt(5.0);  // m: from hinge to hinge, and from there to the centre
+  EXPECT_NEAR(scene.joints[0].coordinates[0].friction, 9.80665 * testing::kBlockMass * (1.5 + link + beyond), 1e-9);
+  EXPECT_NEAR(scene.joints[2].coordinates[0].friction, 9.80665 * testing::kBlockMass * beyond, 1e-9);
 }
 
 TEST(PageFile, AModelToBePosedTakesItsTrianglesAndJointsAlong) {

@@ -13,6 +13,7 @@
 #include "limber/core/stage_times.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/run.h"
+#include "limber/view/page_file.h"
 
 namespace limber {
 namespace {
@@ -149,6 +150,36 @@ TEST_F(PageWorldTest, GoingBackAndForthGivesTheSameHashes) {
 }
 
 /// Of a run that nobody touched it is the file that simulate writes.
+TEST_F(PageWorldTest, ASavedPageGoesOnToTheBit) {
+  PageWorld page(scene());
+  PageSettings settings = page.settings();
+  settings.modes = 2;
+  settings.gravity.z() = -5.0;
+  page.restart(settings);
+  step(page, 20);
+  page.drop(0, {0, 0, 5});
+  page.pin(page.cast_ray({5, 0, 10}, {0, 0, -1}));
+  page.grab(page.cast_ray({0, 0, 3}, {0, 0, -1}));
+  page.drag_to({0, 0, 4});
+  page.lead_joint(0, 1, 0.3);
+  step(page, 10);
+  const std::vector<std::byte> saved = page.saved();
+  PageWorld other(scene());
+  step(other, 5);
+  other.restore(saved);
+  EXPECT_EQ(other.state_hash(), page.state_hash());
+  EXPECT_EQ(other.settings().modes, 2);
+  EXPECT_TRUE(other.holds());
+  EXPECT_EQ(other.pins(), 1);
+  EXPECT_EQ(other.joint_wishes()[2], 0.3);
+  EXPECT_EQ(other.kept(), 2) << "the start and here";
+  step(page, 30), step(other, 30);
+  EXPECT_EQ(other.state_hash(), page.state_hash());
+  EXPECT_EQ(other.saved(), page.saved());
+  EXPECT_THROW(other.restore(std::span(saved).first(saved.size() / 2)), InvalidArgument);
+  EXPECT_EQ(other.steps_taken(), 0) << "it starts anew";
+}
+
 TEST_F(PageWorldTest, ARecordingIsThatOfTheRun) {
   PageWorld page(scene());
   step(page, 30);
@@ -279,6 +310,82 @@ TEST_F(PageWorldTest, ARayMeetsTheBodiesInItsWayAndTheGround) {
   EXPECT_NEAR(places[10], 0.0, 1e-12);
   EXPECT_NEAR(places[13], 1.0, 1e-12);
   EXPECT_TRUE(page.ray_places({0, 0, 5}, {0, 0, 1}).empty());
+}
+
+/// The coordinate of a joint, as the page is told it.
+double coordinate(PageWorld& page, int c) { return page.joint_frames()[static_cast<std::size_t>(6 + c)]; }
+
+TEST_F(PageWorldTest, AJointGoesWhereItIsLedRunsAndIsLeft) {
+  PageWorld page(scene());
+  page.lead_joint(0, 1, 0.4);
+  step(page, 200);
+  EXPECT_NEAR(coordinate(page, 1), 0.4, 0.05);
+  EXPECT_EQ(page.joint_wishes()[2], 0.4);
+  const int led = page.kept() - 1;
+  page.run_joint(0, 1, -1.0);
+  step(page, 50);
+  EXPECT_NEAR(coordinate(page, 1), 0.4 - 0.5, 0.1) << "half a second at a radian a second";
+  EXPECT_TRUE(std::isnan(page.joint_wishes()[2]));
+  EXPECT_EQ(page.joint_wishes()[3], -1.0);
+  page.leave_joint(0, 1);
+  EXPECT_TRUE(std::isnan(page.joint_wishes()[3]));
+  page.go_to(led);
+  EXPECT_EQ(page.joint_wishes()[2], 0.4) << "it is led again, as then";
+  step(page, 50);
+  EXPECT_NEAR(coordinate(page, 1), 0.4, 0.05);
+  EXPECT_THROW(page.lead_joint(1, 0, 0.0), InvalidArgument);
+  EXPECT_THROW(page.lead_joint(0, 3, 0.0), InvalidArgument);
+}
+
+/// A post that stands, and a block on a hinge at its side.
+TEST_F(PageWorldTest, AMachineStaysWhereItIsPut) {
+  ModalModelData post = testing::block_data(2, "post"), arm = testing::block_data(3, "arm");
+  post.origin_in_input = Vec3::Zero(), arm.origin_in_input = {2.1, 0, 0};
+  Asset asset;
+  for (ModalModelData* data : {&post, &arm})
+    asset.bodies.push_back(std::make_shared<const ModalModel>(std::move(*data)));
+  JointSpec hinge{.type = JointType::kRevolute, .frame = {.origin = {1.05, 0, 0.5}}};
+  hinge.frame.axes << 0, 0, 1, 1, 0, 0, 0, 1, 0;  // about y
+  asset.joints = {{.a = 0, .b = 1, .spec = hinge}, {.b = 0, .spec = {.type = JointType::kFixed}, .patch_radius = 2.0}};
+  const std::filesystem::path folder = scene().parent_path();
+  write_asset(folder / "machine.glb", asset);
+  const PageContent content = page_of_asset(folder / "machine.glb");
+  for (const PageFile& file : content.files)
+    write_file(folder / std::filesystem::path(file.path).filename(), file.bytes);
+  PageWorld page(folder / "machine.json");
+  step(page, 120);
+  EXPECT_NEAR(coordinate(page, 0), 0.0, 0.02) << "rad; by friction";
+  page.drop(1, {0, 0, 4});
+  step(page, 120);
+  EXPECT_NEAR(coordinate(page, 0), 0.0, 0.02);
+  EXPECT_FALSE(page.contacts().empty()) << "on the post";
+}
+
+TEST_F(PageWorldTest, ContactsBearWhatLiesOnThem) {
+  PageWorld page(scene());
+  double sum = 0.0;
+  constexpr int kLast = 50;  // steps of the mean
+  for (int i = 0; i < 400; ++i) {
+    page.step();
+    const std::span<const double> contacts = page.contacts();
+    for (std::size_t c = 0; c < contacts.size() && i >= 400 - kLast; c += 6) {
+      sum += contacts[c + 5] / kLast;
+      EXPECT_NEAR(contacts[c + 2], 0.0, 0.05) << "on the ground";
+    }
+  }
+  EXPECT_NEAR(sum, 9.80665 * testing::kBlockMass, 0.05 * 9.80665 * testing::kBlockMass) << "the block that lies, alone";
+}
+
+TEST_F(PageWorldTest, WhatTouchesIsTheDrawnSurfaceWhereThereIsNoOther) {
+  PageWorld page(scene());
+  EXPECT_EQ(&page.touching(0), &page.models()[0]);
+  ModalModelData data = testing::block_data(kModes);
+  data.collision = testing::block_surface(2, kModes);
+  write_asset(scene().parent_path() / "block.glb", {.bodies = {std::make_shared<const ModalModel>(std::move(data))}});
+  PageWorld other(scene());
+  EXPECT_EQ(other.touching(0).rest.size(), 3u * 12u);
+  EXPECT_GT(other.models()[0].rest.size(), 3u * 12u);
+  EXPECT_THROW(other.touching(1), InvalidArgument);
 }
 
 TEST_F(PageWorldTest, TheDescriptionNamesWhatIsThere) {

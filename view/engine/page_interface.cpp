@@ -1,5 +1,6 @@
 // The page's engine as plain C functions: what web/engine.js calls. Texts are UTF-8 and end with zero; arrays stay
 // valid until the next call. Functions that can fail return 0 and leave one line in page_error().
+#include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -26,6 +27,7 @@ std::string error, text;
 PageHit hit;
 std::span<const double> ray, blows;
 double answer[16];
+std::span<const double> contacts;
 
 template <class F>
 int guarded(F&& work) {
@@ -38,7 +40,8 @@ int guarded(F&& work) {
   }
 }
 
-/// From 11 numbers: gravity, drag_frequency, poke_speed, step, substeps, modes, damping, friction, solver.
+/// From 12 numbers: gravity, drag_frequency, poke_speed, step, substeps, modes, damping, friction, solver,
+/// joint_friction.
 PageSettings settings_of(const double* n) {
   PageSettings s;
   s.gravity = {n[0], n[1], n[2]};
@@ -50,6 +53,7 @@ PageSettings settings_of(const double* n) {
   s.damping = n[8];
   s.friction = n[9];
   s.solver = static_cast<limber::ContactSolver>(static_cast<int>(n[10]));
+  s.joint_friction = n[11];
   return s;
 }
 
@@ -65,10 +69,11 @@ EMSCRIPTEN_KEEPALIVE const char* page_description() {
   return guarded([] { text = page->description(); }) != 0 ? text.c_str() : "";
 }
 
-// Data of model i: 0 rest, 1 normals, 2 shapes (floats), 3 triangles (32 bits each).
+// Data of model i: 0 rest, 1 normals, 2 shapes (floats), 3 triangles (32 bits each); 4 to 7: of the surface that
+// touches.
 EMSCRIPTEN_KEEPALIVE const void* page_model_data(int model, int what) {
-  const limber::PageModel& m = page->models()[static_cast<std::size_t>(model)];
-  switch (what) {
+  const limber::PageModel& m = what < 4 ? page->models()[static_cast<std::size_t>(model)] : page->touching(model);
+  switch (what % 4) {
     case 0:
       return m.rest.data();
     case 1:
@@ -78,6 +83,14 @@ EMSCRIPTEN_KEEPALIVE const void* page_model_data(int model, int what) {
     default:
       return m.triangles.data();
   }
+}
+// Vertices and triangles of the surface that touches; none: it is the drawn one.
+EMSCRIPTEN_KEEPALIVE const double* page_touching_size(int model) {
+  const limber::PageModel& m = page->touching(model);
+  const bool drawn = &m == &page->models()[static_cast<std::size_t>(model)];
+  answer[0] = drawn ? 0.0 : static_cast<double>(m.rest.size() / 3);
+  answer[1] = drawn ? 0.0 : static_cast<double>(m.triangles.size() / 3);
+  return answer;
 }
 
 EMSCRIPTEN_KEEPALIVE int page_set_live(const double* settings) {
@@ -100,6 +113,24 @@ EMSCRIPTEN_KEEPALIVE const float* page_frame() { return page->frame().data(); }
 EMSCRIPTEN_KEEPALIVE const double* page_numbers() { return page->numbers().data(); }
 EMSCRIPTEN_KEEPALIVE const double* page_stage_seconds() { return page->stage_seconds().data(); }
 EMSCRIPTEN_KEEPALIVE const double* page_joint_frames() { return page->joint_frames().data(); }
+// Per joint and coordinate (3) where it is led, and its speed; NaN: nowhere, none.
+EMSCRIPTEN_KEEPALIVE const double* page_joint_wishes() { return page->joint_wishes().data(); }
+EMSCRIPTEN_KEEPALIVE int page_lead_joint(int joint, int coordinate, double place) {
+  return guarded([&] { page->lead_joint(joint, coordinate, place); });
+}
+EMSCRIPTEN_KEEPALIVE int page_run_joint(int joint, int coordinate, double speed) {
+  return guarded([&] { page->run_joint(joint, coordinate, speed); });
+}
+EMSCRIPTEN_KEEPALIVE int page_leave_joint(int joint, int coordinate) {
+  return guarded([&] { page->leave_joint(joint, coordinate); });
+}
+
+// What pressed in the last step, six numbers each (PageWorld::contacts()): how many, and where they are until the next.
+EMSCRIPTEN_KEEPALIVE int page_contact_count() {
+  contacts = page->contacts();
+  return static_cast<int>(contacts.size() / 6);
+}
+EMSCRIPTEN_KEEPALIVE const double* page_contacts() { return contacts.data(); }
 EMSCRIPTEN_KEEPALIVE const double* page_sensor_counts() { return page->sensor_counts().data(); }
 
 // Places that a ray meets, seven numbers each (PageWorld::ray_places()): how many, and where they are until the next.
@@ -186,6 +217,19 @@ EMSCRIPTEN_KEEPALIVE int page_kept() { return page->kept(); }
 EMSCRIPTEN_KEEPALIVE double page_kept_step(int key) { return static_cast<double>(page->kept_step(key)); }
 EMSCRIPTEN_KEEPALIVE int page_go_to(int key) {
   return guarded([&] { page->go_to(key); });
+}
+
+// All that is to be known to go on from here: how many bytes, 0 where it fails; page_text() has them.
+EMSCRIPTEN_KEEPALIVE double page_save() {
+  return guarded([] {
+           const std::vector<std::byte> saved = page->saved();
+           text.assign(reinterpret_cast<const char*>(saved.data()), saved.size());
+         }) != 0
+             ? static_cast<double>(text.size())
+             : 0.0;
+}
+EMSCRIPTEN_KEEPALIVE int page_restore(const std::byte* saved, int size) {
+  return guarded([&] { page->restore({saved, static_cast<std::size_t>(size)}); });
 }
 
 // A GLB of what was kept: how many bytes, 0 where it fails; page_text() has them until the next text.

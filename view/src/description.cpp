@@ -37,55 +37,45 @@ Json limits(const JointSpec& spec) {
   return Json::array();
 }
 
-/// @param standing a static or a sensor
-template <class Standing>
-Json standing_shape(const Standing& standing, const Shape& shape) {
-  constexpr double kHalfSide = 3.0;  // m, of what is shown of a half-space
-  const TriangleMesh mesh = surface_of(shape, Vec3::Zero(), kHalfSide);
+constexpr double kHalfSide = 3.0;  // m, of what is shown of a half-space
+
+Json surface_json(const TriangleMesh& mesh, const RigidTransform& pose) {
   Json points = Json::array(), corners = Json::array();
   for (const Vec3& p : mesh.vertices) {
-    const Vec3 x = standing.pose * p;
+    const Vec3 x = pose * p;
     for (int i = 0; i < 3; ++i) points.push_back(x[i]);
   }
   for (const Triangle& t : mesh.triangles)
     for (const Index v : t) corners.push_back(v);
-  return {{"name", standing.name},
-          {"ground", std::holds_alternative<HalfSpace>(shape)},
-          {"points", std::move(points)},
-          {"triangles", std::move(corners)}};
+  return {{"points", std::move(points)}, {"triangles", std::move(corners)}};
+}
+
+/// @param standing a static or a sensor
+template <class Standing>
+Json standing_shape(const Standing& standing, const Shape& shape) {
+  Json json = surface_json(surface_of(shape, Vec3::Zero(), kHalfSide), standing.pose);
+  json["name"] = standing.name;
+  json["ground"] = std::holds_alternative<HalfSpace>(shape);
+  return json;
 }
 
 }  // namespace
-
-std::vector<JointPlace> joint_places(const Scene& scene, const World& world, std::span<const PageBody> bodies) {
-  std::vector<JointPlace> places;
-  for (const SceneJoint& joint : scene.joints) {
-    const std::string& on = joint.a.empty() ? joint.b : joint.a;
-    JointPlace place{.on = {}, .origin = joint.spec.frame.origin, .axis = joint.spec.frame.axes.col(0)};
-    for (const PageBody& body : bodies) {
-      if (body.name != on) continue;
-      const RigidTransform X = world.body(body.id).pose.inverse();
-      place = {body.id, X * place.origin, X.q * place.axis};
-    }
-    places.push_back(place);
-  }
-  return places;
-}
 
 std::string describe(const Scene& scene, const SceneModels& models, std::span<const PageModel> shown,
                      std::span<const PageBody> bodies, const PageSettings& settings) {
   Json out;
   out["name"] = scene.name;
-  out["settings"] = {{"gravity", vector(settings.gravity)}, {"drag_frequency", settings.drag_frequency},
-                     {"poke_speed", settings.poke_speed},   {"step", settings.step},
-                     {"substeps", settings.substeps},       {"modes", settings.modes},
-                     {"damping", settings.damping},         {"friction", settings.friction},
-                     {"solver", to_string(settings.solver)}};
+  out["settings"] = {{"gravity", vector(settings.gravity)},  {"drag_frequency", settings.drag_frequency},
+                     {"poke_speed", settings.poke_speed},    {"step", settings.step},
+                     {"substeps", settings.substeps},        {"modes", settings.modes},
+                     {"damping", settings.damping},          {"friction", settings.friction},
+                     {"solver", to_string(settings.solver)}, {"joint_friction", settings.joint_friction}};
   out["contact"] = scene.contacts.options.has_value();
   out["models"] = Json::array();
   for (const PageModel& model : shown)
     out["models"].push_back(
         {{"name", model.name},
+         {"mass", model.mass},
          {"sound",
           {{"modes", model.sound ? model.sound->modes() : 0}, {"vertices", model.sound ? model.sound->vertices : 0}}},
          {"vertices", model.rest.size() / 3},
@@ -93,7 +83,11 @@ std::string describe(const Scene& scene, const SceneModels& models, std::span<co
          {"frequencies", model.frequencies},
          {"visible_amplitudes", model.visible_amplitudes}});
   out["bodies"] = Json::array();
-  for (const PageBody& body : bodies) out["bodies"].push_back({{"name", body.name}, {"model", body.model}});
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    out["bodies"].push_back({{"name", bodies[i].name}, {"model", bodies[i].model}});
+    if (i < models.shape_of_body.size() && models.shape_of_body[i])
+      out["bodies"].back()["shape"] = surface_json(surface_of(*models.shape_of_body[i], Vec3::Zero(), kHalfSide), {});
+  }
   out["statics"] = Json::array();
   for (std::size_t i = 0; i < scene.statics.size(); ++i)
     out["statics"].push_back(standing_shape(scene.statics[i], *models.shape_of_static[i]));

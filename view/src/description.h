@@ -19,15 +19,6 @@ struct PageBody {
   bool dropped = false;  ///< by a person
 };
 
-/// Body of a joint's frame: part a, or b where a is the world, which moves rigidly here.
-struct JointPlace {
-  BodyId on{};  ///< none: the world
-  Vec3 origin = Vec3::Zero(), axis = Vec3::UnitX();
-};
-
-/// As bodies stand now.
-std::vector<JointPlace> joint_places(const Scene& scene, const World& world, std::span<const PageBody> bodies);
-
 /// JSON in ASCII; what is no UTF-8 in names is replaced.
 std::string describe(const Scene& scene, const SceneModels& models, std::span<const PageModel> shown,
                      std::span<const PageBody> bodies, const PageSettings& settings);

@@ -7,6 +7,25 @@
 
 namespace limber::internal {
 
+void write_hands(const Hands& hands, StateWriter& state) {
+  state(hands.hand.index, hands.hand.generation, hands.body.index, hands.body.generation, hands.at);
+  state(static_cast<std::uint64_t>(hands.pins.size()), hands.joints);
+  for (const HandleId pin : hands.pins) state(pin.index, pin.generation);
+}
+
+Hands read_hands(StateReader& state) {
+  Hands hands;
+  state(hands.hand.index, hands.hand.generation, hands.body.index, hands.body.generation, hands.at);
+  const auto pins = state.read<std::uint64_t>();
+  state(hands.joints);
+  for (std::uint64_t i = 0; i < pins; ++i) {
+    HandleId pin;
+    state(pin.index, pin.generation);
+    hands.pins.push_back(pin);
+  }
+  return hands;
+}
+
 void PageHistory::keep(const ScenePlayer& player, const Hands& hands, std::size_t dropped) {
   constexpr std::size_t kMostBytes = 100u << 20;
   while (!keys_.empty() && keys_.back().step >= player.steps_taken()) keys_.pop_back();

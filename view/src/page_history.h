@@ -6,18 +6,25 @@
 #include <cstdint>
 #include <vector>
 
+#include "limber/core/state_archive.h"
 #include "limber/engine/world.h"
 #include "limber/scene/scene_player.h"
+#include "page_joints.h"
 
 namespace limber::internal {
 
-/// Points that a person holds.
+/// What a person holds.
 struct Hands {
   HandleId hand{};
   BodyId body{};
   SurfacePoint at{};
   std::vector<HandleId> pins{};
+  JointWishes joints{};
 };
+
+/// As bytes for worlds with the same bodies (limber/core/state_archive.h), and back.
+void write_hands(const Hands& hands, StateWriter& state);
+Hands read_hands(StateReader& state);
 
 class PageHistory {
  public:

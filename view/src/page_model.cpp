@@ -33,10 +33,9 @@ std::vector<Vec3f> normal_changes(const ModalSurface& surface, Index mode) {
 
 }  // namespace
 
-PageModel page_model(const ModalModel& model) {
+PageModel page_model(const ModalModel& model, const ModalSurface& surface) {
   constexpr float kShown = 0.1f;  // of the model's size
-  const ModalSurface& surface = model.render();
-  PageModel page{.name = model.name()};
+  PageModel page{.name = model.name(), .mass = model.data().mass};
   const std::vector<Vec3f> normals = summed_normals(surface);
   std::vector<float> length;
   float size = 0.0f;

@@ -7,7 +7,8 @@
 
 namespace limber::internal {
 
-PageModel page_model(const ModalModel& model);
+/// @param surface of the model: what is drawn, or what touches
+PageModel page_model(const ModalModel& model, const ModalSurface& surface);
 
 /// With the first modes alone, and other damping. Residual compliance answers for those left out.
 std::shared_ptr<const ModalModel> with_settings(const std::shared_ptr<const ModalModel>& model,

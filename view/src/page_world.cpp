@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -10,17 +11,28 @@
 #include "description.h"
 #include "limber/core/error.h"
 #include "limber/core/stage_times.h"
+#include "limber/core/state_archive.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/scene_player.h"
 #include "page_history.h"
+#include "page_joints.h"
 #include "page_model.h"
 #include "page_sound.h"
 #include "page_tracks.h"
 
 namespace limber {
+
+template <class Self>
+requires std::is_same_v<std::remove_const_t<Self>, PageSettings>
+auto state_fields(Self& s) {
+  return std::tie(s.gravity, s.drag_frequency, s.poke_speed, s.step, s.substeps, s.modes, s.damping, s.friction,
+                  s.solver, s.joint_friction);
+}
+
 namespace {
 
 constexpr double kFar = 1e4;                              // m, how long rays are
+constexpr std::uint32_t kSaved = 0x4c505731;              // that bytes are a saved page, in this form
 constexpr std::int64_t kForever = std::int64_t{1} << 40;  // steps: what the scene does ends by its own times
 
 void check(const PageSettings& s) {
@@ -35,6 +47,7 @@ void check(const PageSettings& s) {
   number(s.step, true, "step");
   number(s.damping, false, "damping");
   number(s.friction, false, "friction");
+  number(s.joint_friction, false, "joint_friction");
   if (s.substeps < 1) throw InvalidArgument("PageSettings: substeps is " + std::to_string(s.substeps) + ", expected 1");
   if (s.modes < 0) throw InvalidArgument("PageSettings: modes is " + std::to_string(s.modes) + ", expected 0 or more");
 }
@@ -64,6 +77,11 @@ struct PageWorld::Impl {
     return static_cast<std::size_t>(
         std::count_if(bodies.begin(), bodies.end(), [](const internal::PageBody& b) { return b.dropped; }));
   }
+  void check_model(int model, const char* function) const {
+    if (model < 0 || static_cast<std::size_t>(model) >= kinds.size())
+      throw InvalidArgument(std::string("PageWorld::") + function + ": model " + std::to_string(model) +
+                            ", expected 0 to " + std::to_string(kinds.size() - 1));
+  }
   void add_dropped(std::size_t count);
   void forget_removed();
 
@@ -80,12 +98,13 @@ struct PageWorld::Impl {
   std::vector<int> drops;  // model of each body dropped so far, in this history
   internal::Hands hands;
   internal::PageHistory history;
-  std::vector<internal::JointPlace> joint_places;
+  std::optional<internal::PageJoints> joints;
   internal::PageSound sound;
   struct {
     std::vector<float> frame;
-    std::vector<double> numbers, joint_frames, sensor_counts, ray_places, amplitudes,
+    std::vector<double> numbers, joint_frames, joint_wishes, contacts, sensor_counts, ray_places, amplitudes,
         stage_seconds = std::vector<double>(kStages, 0.0);
+    std::map<int, PageModel> touching;
   } told_to_page;  // what spans of the page point into
 };
 
@@ -99,19 +118,22 @@ void PageWorld::Impl::start() {
   if (scene.contacts.rule.is_own()) scene.contacts.solver = settings.solver;
   models = baked;
   std::map<const ModalModel*, int> kind_of;
+  told_to_page.touching.clear();
   kinds.clear(), shown.clear(), bodies.clear(), drops.clear(), history.clear();
   std::vector<int> kind_of_body;
   for (std::shared_ptr<const ModalModel>& model : models.of_body) {
     const auto [found, fresh] = kind_of.emplace(model.get(), static_cast<int>(kinds.size()));
     if (fresh) {
       kinds.push_back(internal::with_settings(model, settings));
-      shown.push_back(internal::page_model(*kinds.back()));
+      shown.push_back(internal::page_model(*kinds.back(), kinds.back()->render()));
       const std::shared_ptr<const SoundModes>& heard = models.sound_of_body[kind_of_body.size()];
       if (heard && heard->modes() > 0) shown.back().sound = heard;
     }
     model = kinds[static_cast<std::size_t>(found->second)];
     kind_of_body.push_back(found->second);
   }
+  for (SceneJoint& joint : scene.joints)
+    for (JointActuation& acts : joint.coordinates) acts.friction *= settings.joint_friction;
   for (SceneBody& body : scene.bodies) body.placement.modal_skin = false;  // as the page draws them
   player.emplace(scene, models, kForever);
   world().set_stage_times(&times);
@@ -119,7 +141,7 @@ void PageWorld::Impl::start() {
     bodies.push_back({player->bodies()[i], kind_of_body[i], scene.bodies[i].name});
   hands = {};
   sound.begin(shown, kinds);
-  joint_places = internal::joint_places(scene, world(), bodies);
+  joints.emplace(scene, world(), bodies, player->joints());
 }
 
 PageWorld::PageWorld(const std::filesystem::path& scene) : impl_(std::make_unique<Impl>(scene)) {
@@ -133,6 +155,15 @@ std::string PageWorld::description() const {
   return internal::describe(m.scene, m.models, m.shown, m.bodies, m.settings);
 }
 const std::vector<PageModel>& PageWorld::models() const { return impl_->shown; }
+const PageModel& PageWorld::touching(int model) {
+  Impl& m = *impl_;
+  m.check_model(model, "touching");
+  const ModalModel& kind = *m.kinds[static_cast<std::size_t>(model)];
+  if (!kind.data().collision) return m.shown[static_cast<std::size_t>(model)];
+  const auto found = m.told_to_page.touching.find(model);
+  if (found != m.told_to_page.touching.end()) return found->second;
+  return m.told_to_page.touching.emplace(model, internal::page_model(kind, kind.collision())).first->second;
+}
 const World& PageWorld::world() const { return impl_->world(); }
 PageSettings PageWorld::settings() const { return impl_->settings; }
 
@@ -206,18 +237,20 @@ std::span<const double> PageWorld::numbers() {
 }
 
 std::span<const double> PageWorld::joint_frames() {
+  impl_->joints->frames(impl_->world(), impl_->told_to_page.joint_frames);
+  return impl_->told_to_page.joint_frames;
+}
+
+std::span<const double> PageWorld::contacts() {
   Impl& m = *impl_;
-  m.told_to_page.joint_frames.clear();
-  for (std::size_t i = 0; i < m.joint_places.size(); ++i) {
-    const internal::JointPlace& place = m.joint_places[i];
-    const RigidTransform X = place.on.generation == 0 ? RigidTransform{} : m.world().body(place.on).pose;
-    const Vec3 origin = X * place.origin, axis = X.q * place.axis;
-    const JointView view = m.world().joint(m.player->joints()[i]);
-    for (const double x : {origin.x(), origin.y(), origin.z(), axis.x(), axis.y(), axis.z()})
-      m.told_to_page.joint_frames.push_back(x);
-    m.told_to_page.joint_frames.insert(m.told_to_page.joint_frames.end(), view.position.begin(), view.position.end());
+  std::vector<double>& contacts = m.told_to_page.contacts;
+  contacts.clear();
+  for (const ContactEvent& event : m.world().contact_events()) {
+    if (event.phase == ContactPhase::kEnded) continue;
+    const Vec3 force = event.impulse / m.scene.step;
+    for (const Vec3& v : {event.position, force}) contacts.insert(contacts.end(), v.begin(), v.end());
   }
-  return m.told_to_page.joint_frames;
+  return contacts;
 }
 
 std::span<const double> PageWorld::sensor_counts() {
@@ -320,11 +353,31 @@ void PageWorld::poke(const PageHit& hit, const Vec3& direction, double contact_t
                0.0, m.bodies);
 }
 
+void PageWorld::lead_joint(int joint, int coordinate, double place) {
+  impl_->joints->wish(impl_->world(), impl_->hands.joints, joint, coordinate, {.place = place});
+}
+void PageWorld::run_joint(int joint, int coordinate, double speed) {
+  impl_->joints->wish(impl_->world(), impl_->hands.joints, joint, coordinate, {.speed = speed});
+}
+void PageWorld::leave_joint(int joint, int coordinate) {
+  impl_->joints->wish(impl_->world(), impl_->hands.joints, joint, coordinate, {});
+}
+
+std::span<const double> PageWorld::joint_wishes() {
+  std::vector<double>& wishes = impl_->told_to_page.joint_wishes;
+  wishes.assign(6 * impl_->scene.joints.size(), std::numeric_limits<double>::quiet_NaN());
+  std::size_t at = 0;
+  for (const auto& joint : impl_->hands.joints)
+    for (const internal::CoordinateWish& wish : joint) {
+      wishes[at++] = wish.place;
+      wishes[at++] = wish.speed;
+    }
+  return wishes;
+}
+
 void PageWorld::drop(int model, const Vec3& position) {
   Impl& m = *impl_;
-  if (model < 0 || static_cast<std::size_t>(model) >= m.kinds.size())
-    throw InvalidArgument("PageWorld::drop: model " + std::to_string(model) + ", expected 0 to " +
-                          std::to_string(m.kinds.size() - 1));
+  m.check_model(model, "drop");
   m.drops.resize(m.dropped());  // those of a future that will not be
   m.drops.push_back(model);
   m.add_dropped(m.drops.size());
@@ -382,6 +435,40 @@ void PageWorld::go_to(int key) {
   m.forget_removed();
   m.hands = at.hands;
   m.settings.gravity = m.world().options().gravity;
+}
+
+std::vector<std::byte> PageWorld::saved() const {
+  const Impl& m = *impl_;
+  std::vector<std::byte> bytes, state;
+  m.player->save_state(state);
+  StateWriter write(bytes);
+  write(kSaved, m.settings,
+        std::vector<int>(m.drops.begin(), m.drops.begin() + static_cast<std::ptrdiff_t>(m.dropped())));
+  internal::write_hands(m.hands, write);
+  write(state);
+  return bytes;
+}
+
+void PageWorld::restore(std::span<const std::byte> saved) {
+  Impl& m = *impl_;
+  try {
+    StateReader read(saved);
+    if (read.read<std::uint32_t>() != kSaved) throw InvalidArgument("PageWorld::restore: is no saved page");
+    const auto settings = read.read<PageSettings>();
+    const auto drops = read.read<std::vector<int>>();
+    const internal::Hands hands = internal::read_hands(read);
+    const auto state = read.read<std::vector<std::byte>>();
+    restart(settings);
+    for (const int model : drops) m.check_model(model, "restore");
+    m.drops = drops;
+    m.add_dropped(drops.size());
+    m.player->restore_state(state);
+    m.hands = hands;
+  } catch (const InvalidArgument&) {
+    restart(PageSettings(m.settings));
+    throw;
+  }
+  keep();
 }
 
 std::string PageWorld::recording() {

@@ -1,24 +1,13 @@
 // The engine: WebAssembly behind plain functions, with texts and arrays copied out where they are to last.
 import makePageEngine from 'page-engine';
+import { fileOf, unzipped } from './unpack.js';
 
-export function bytesOf(base64) {
-  const text = atob(base64.trim());
-  const bytes = new Uint8Array(text.length);
-  for (let i = 0; i < text.length; ++i) bytes[i] = text.charCodeAt(i);
-  return bytes;
-}
-
-export async function unzipped(bytes) {
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
-/** @param wasm compressed by gzip. @param files [{path, base64}], their paths below /scene/ */
+/** @param wasm compressed by gzip. @param files of the page (unpack.js), their paths below /scene/ */
 export async function openModule(wasm, files) {
   const module = await makePageEngine({ wasmBinary: await unzipped(wasm), print() {}, printErr() {} });
-  for (const { path, base64 } of files) {
-    module.FS.mkdirTree(path.slice(0, path.lastIndexOf('/')));
-    module.FS.writeFile(path, bytesOf(base64));
+  for (const file of files) {
+    module.FS.mkdirTree(file.path.slice(0, file.path.lastIndexOf('/')));
+    module.FS.writeFile(file.path, await fileOf(file));
   }
   return module;
 }
@@ -32,7 +21,7 @@ export class Engine {
     const opened = module._page_open(at);
     module._free(at);
     this.check(opened);
-    this.settingsAt = module._malloc(11 * 8);
+    this.settingsAt = module._malloc(12 * 8);
     this.describe();
   }
 
@@ -50,22 +39,31 @@ export class Engine {
   doubles(at, count) { return this.module.HEAPF64.slice(at / 8, at / 8 + count); }
 
   model(i) {
-    const { vertices, triangles, frequencies } = this.scene.models[i], data = (what) => this.module._page_model_data(i, what);
+    const { vertices, triangles } = this.scene.models[i];
+    return this.surface(i, 0, vertices, triangles);
+  }
+  /** The surface by which bodies of a model touch; null: the drawn one. */
+  touching(i) {
+    const [vertices, triangles] = this.doubles(this.module._page_touching_size(i), 2);
+    return vertices === 0 ? null : this.surface(i, 4, vertices, triangles);
+  }
+  surface(i, first, vertices, triangles) {
+    const modes = this.scene.models[i].frequencies.length, data = (what) => this.module._page_model_data(i, first + what);
     const corners = data(3) / 4;
     return {
       rest: this.floats(data(0), 3 * vertices),
       normals: this.floats(data(1), 3 * vertices),
-      shapes: this.floats(data(2), 8 * vertices * frequencies.length),
+      shapes: this.floats(data(2), 8 * vertices * modes),
       triangles: this.module.HEAPU32.slice(corners, corners + 3 * triangles),
       vertices,
-      modes: frequencies.length,
+      modes,
     };
   }
 
   writeSettings(s) {
     const solvers = ['game', 'exact'];
     this.module.HEAPF64.set([...s.gravity, s.drag_frequency, s.poke_speed, s.step, s.substeps, s.modes, s.damping, s.friction,
-      solvers.indexOf(s.solver)], this.settingsAt / 8);
+      solvers.indexOf(s.solver), s.joint_friction], this.settingsAt / 8);
   }
   setLive(s) { this.writeSettings(s); this.check(this.module._page_set_live(this.settingsAt)); }
   restart(s) { this.writeSettings(s); this.check(this.module._page_restart(this.settingsAt)); this.describe(); }
@@ -82,6 +80,19 @@ export class Engine {
   /** Seconds of the last step, as limber/core/stage_times.h has its stages, those of a step. */
   stages() { return [...this.doubles(this.module._page_stage_seconds(), 8)]; }
   jointFrames() { return this.doubles(this.module._page_joint_frames(), 9 * this.scene.joints.length); }
+  /** @return by joint and coordinate {place, speed} where it is led and how fast it runs; NaN: neither */
+  jointWishes() {
+    const all = this.doubles(this.module._page_joint_wishes(), 6 * this.scene.joints.length);
+    return this.scene.joints.map((_, j) => [0, 1, 2].map((c) => ({ place: all[6 * j + 2 * c], speed: all[6 * j + 2 * c + 1] })));
+  }
+  leadJoint(joint, coordinate, place) { this.check(this.module._page_lead_joint(joint, coordinate, place)); }
+  runJoint(joint, coordinate, speed) { this.check(this.module._page_run_joint(joint, coordinate, speed)); }
+  leaveJoint(joint, coordinate) { this.check(this.module._page_leave_joint(joint, coordinate)); }
+  /** @return six numbers each, of what pressed in the last step: place and force */
+  contacts() {
+    const count = this.module._page_contact_count();
+    return this.doubles(this.module._page_contacts(), 6 * count);
+  }
   /** How many bodies are in each sensor. */
   sensorCounts() { return this.doubles(this.module._page_sensor_counts(), this.scene.sensors.length); }
 
@@ -131,8 +142,18 @@ export class Engine {
   goTo(key) { this.check(this.module._page_go_to(key)); this.describe(); }
 
   /** @return the bytes of an animated GLB */
-  recording() {
-    const size = this.module._page_record();
+  recording() { return this.bytes(this.module._page_record()); }
+  /** @return bytes from which a page goes on that has the same scene */
+  saved() { return this.bytes(this.module._page_save()); }
+  restore(bytes) {
+    const at = this.module._malloc(bytes.length);
+    this.module.HEAPU8.set(bytes, at);
+    const restored = this.module._page_restore(at, bytes.length);
+    this.module._free(at);
+    this.check(restored);
+    this.describe();
+  }
+  bytes(size) {
     this.check(size > 0);
     const at = this.module._page_text();
     return this.module.HEAPU8.slice(at, at + size);

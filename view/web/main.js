@@ -1,12 +1,14 @@
 // The page: a scene that goes on in real time, and a person who reaches into it.
-import { bytesOf, Engine, openModule } from './engine.js';
+import { Engine, openModule } from './engine.js';
 import { download } from './dom.js';
 import { tell } from './message.js';
 import { Panel } from './panel.js';
 import { PoseApp } from './pose.js';
 import { PoseEngine } from './pose_engine.js';
+import { Original, standing } from './share.js';
 import { Sound } from './sound.js';
 import { Stage } from './stage.js';
+import { bytesOf } from './unpack.js';
 
 const MOST_STEPS_A_FRAME = 6;
 const LONGEST_FRAME = 100;  // ms, after which no other step begins: a heavy scene goes slower, and the page still answers
@@ -26,6 +28,7 @@ class App {
     this.pointer = null;  // a pointer's last place over the picture, until it was looked at
     stage.load(engine);
     this.sound = new Sound(this);
+    stage.frameAll(engine);
     this.panel = new Panel(document.getElementById('panel'), this);
     this.listen();
     this.fit();
@@ -166,6 +169,26 @@ class App {
     download(bytes, 'model/gltf-binary', `${this.engine.scene.name}.glb`);
   }
 
+  /** The page with the scene as it stands, to the browser's downloads. */
+  share() {
+    try {
+      download(this.original.with(standing(this)), 'text/html', `${this.engine.scene.name}.html`);
+    } catch (error) {
+      tell(error.message);
+    }
+  }
+
+  /** Goes on from what another page was saved with. */
+  goOn({ state, view, playing }) {
+    this.engine.restore(bytesOf(state));
+    this.settings = structuredClone(this.engine.scene.settings);
+    this.stage.load(this.engine);
+    this.panel.build();
+    this.stage.camera.position.fromArray(view.position);
+    this.stage.controls.target.fromArray(view.target);
+    this.setPlaying(playing && this.playing);
+  }
+
   unpin() {
     this.resume();
     this.engine.unpin();
@@ -215,18 +238,22 @@ class App {
     const hand = this.stage.place(this.engine);
     if (this.ray) this.ray.places = this.engine.rayPlaces(this.ray.from, this.ray.along);
     this.stage.drawRay(this.ray?.from, this.ray?.places ?? []);
+    this.panel.marks.show();
     this.panel.show(this.engine.numbers(), hand);
     this.stage.draw();
   }
 }
 
 async function main() {
-  const { scene, joints, files } = JSON.parse(document.getElementById('files').textContent);
+  const original = new Original();
+  const { scene, joints, files, stands } = JSON.parse(document.getElementById('files').textContent);
   const module = await openModule(bytesOf(document.getElementById('engine').textContent), files);
   const engine = joints ? new PoseEngine(module, scene, joints) : new Engine(module, scene);
   document.title = `${engine.scene.name} – limber`;
   const stage = new Stage(document.getElementById('view'));
   const app = joints ? new PoseApp(engine, stage) : new App(engine, stage);
+  app.original = original;
+  if (stands) app.goOn(stands);
   globalThis.limber = app;
   let last = performance.now();
   const draw = (now) => {

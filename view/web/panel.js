@@ -1,21 +1,15 @@
 // The controls at the side.
 import { button, choice, element, section, Sheets, slider } from './dom.js';
 import { Chart } from './charts.js';
+import { JointControls } from './joints.js';
+import { Marks } from './marks.js';
 
 const TOOLS = [['drag', 'Drag'], ['poke', 'Poke'], ['pin', 'Pin'], ['ray', 'Ray'], ['follow', 'Follow']];
 const KEYS = [['Space', 'pause, play'], ['.', 'one step'], ['Home', 'see all'], ['Ctrl', 'with a drag beside the bodies: move the view']];
-/** Which coordinates of a joint are angles. */
-const ANGLES = { revolute: [true], prismatic: [false], cylindrical: [true, false], planar: [false, false, true], ball: [true, true, true], fixed: [] };
 const MANY = 6;  // models: more fill the panel
 const SOLVERS = [['game', 'game'], ['exact', 'exact']];
 
 const count = (number, one, many) => `${number} ${number === 1 ? one : many}`;
-
-/** Angles in degrees, lengths in metres; a limit of null is open. */
-function coordinate(angle, x, low, high) {
-  const text = (y) => (angle ? `${((180 / Math.PI) * y).toFixed(1)}°` : `${y.toPrecision(3)} m`);
-  return low === null && high === null ? text(x) : `${text(x)} in [${low === null ? '−∞' : text(low)}, ${high === null ? '∞' : text(high)}]`;
-}
 
 export class Panel {
   constructor(host, app) {
@@ -25,7 +19,8 @@ export class Panel {
     this.means = [0, 0, 0, 0];  // ms: a step, and its parts
     this.contacts = new Chart('Contacts', '', [['', '#b0508c']]);
     this.state = element('small');
-    this.joints = element('table');
+    this.joints = new JointControls(app);
+    this.marks = new Marks(app);
     this.sheets = new Sheets(host, ['Controls', 'Details'], () => app.fit());
     if (app.sound.possible) host.querySelector('nav').append(app.sound.button());
     this.build();
@@ -45,7 +40,8 @@ export class Panel {
       ...(app.sound.possible ? [section('Sound', true, ...app.sound.controls())] : [])], [
       section('World', true, ...this.world()),
       section('Modes', scene.joints.length === 0 && !scene.contact, ...this.modes()),
-      section('Joints', scene.joints.length > 0, this.joints),
+      section('Joints', scene.joints.length > 0, ...this.joints.build()),
+      section('Show', true, this.marks.build()),
       section('Charts', true, this.energy.element, this.time.element, this.contacts.element, this.state),
       section('Keys', false, element('table', {}, ...KEYS.map(([key, does]) =>
         element('tr', {}, element('td', { textContent: key }), element('td', { textContent: does }))))),
@@ -57,7 +53,8 @@ export class Panel {
     const { app } = this;
     this.play = button('Pause', () => app.setPlaying(!app.playing));
     return element('div', {}, element('div', { className: 'row' }, this.play, button('Step', () => app.stepOnce()),
-      button('Start again', () => app.restart()), button('See all', () => app.seeAll()), button('Save GLB', () => app.save())),
+      button('Start again', () => app.restart()), button('See all', () => app.seeAll()), button('Save GLB', () => app.save()),
+      button('Share', () => app.share(), { title: 'Saves this page with the scene as it stands' })),
       slider('Speed', { min: 0.02, max: 1, step: 0.02, value: app.speed, show: (x) => `× ${x.toFixed(2)}` }, (x) => { app.speed = x; }),
       this.scrub);
   }
@@ -91,6 +88,7 @@ export class Panel {
       this.anew('modes', 'Modes', { min: 0, max: this.mostModes, step: 1, show: (x) => `${x}` }),
       this.anew('damping', 'Damping', { min: 0, max: 5, step: 0.05, show: (x) => `× ${x.toFixed(2)}` }),
       this.anew('friction', 'Friction', { min: 0, max: 1.5, step: 0.05, show: (x) => x.toFixed(2) }),
+      ...(app.engine.scene.joints.length > 0 ? [this.anew('joint_friction', 'In joints', { min: 0, max: 2, step: 0.05, show: (x) => `× ${x.toFixed(2)}` })] : []),
       choice('Contact', SOLVERS, app.settings.solver, (solver) => { app.settings.solver = solver; }),
       element('div', { className: 'row' }, button('Start again', () => app.restart()))];
   }
@@ -135,7 +133,7 @@ export class Panel {
     this.state.textContent = (hand.holds ? `hand pulls ${force.toPrecision(3)} N; ` : '') +
       `${count(app.engine.scene.bodies.length, 'body', 'bodies')}, ${numbers.asleep} asleep, ${count(hand.pins, 'pin', 'pins')}, state ${app.engine.hash()}` +
       (numbers.solved ? '' : '; some islands ended at a limit');
-    this.showJoints();
+    this.joints.show();
     this.showRay();
   }
 
@@ -155,13 +153,5 @@ export class Panel {
     this.energy.add([numbers.rigid, numbers.modal + numbers.elastic, numbers.rigid + numbers.modal + numbers.elastic + numbers.potential]);
     this.time.add([...this.means]);
     this.contacts.add([numbers.contacts]);
-  }
-
-  showJoints() {
-    const { joints } = this.app.engine.scene, frames = this.app.engine.jointFrames();
-    this.joints.replaceChildren(...joints.map((joint, j) => element('tr', {},
-      element('td', { textContent: `${joint.a || 'world'} – ${joint.b}` }), element('td', { textContent: joint.type }),
-      element('td', { textContent: joint.limits.map(([low, high], i) =>
-        coordinate(ANGLES[joint.type][i], frames[9 * j + 6 + i], low, high)).join('; ') }))));
   }
 }

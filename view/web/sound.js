@@ -1,7 +1,7 @@
 // What one hears: blows of the scene, sent once a frame to the thread that plays (sound_worklet.js). A page from disk shares
 // no memory between threads, so they go by the node's message port.
 import { button, element, slider } from './dom.js';
-import { bytesOf, unzipped } from './engine.js';
+import { bytesOf, unzipped } from './unpack.js';
 import { tell } from './message.js';
 
 const HEAD = 0.09;     // m, from the middle to an ear

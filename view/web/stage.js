@@ -33,6 +33,7 @@ export class Stage {
     this.bodies = [];
     this.caster = new THREE.Raycaster();
     this.followed = null;  // {body, position}
+    this.size = 1;         // m, of all there is to see
     this.free = 1;         // of the picture's height: the smaller side of what the panel leaves
   }
 
@@ -138,9 +139,9 @@ export class Stage {
 
   /** At a box, from in front and above. @param onGround which is at z = 0 */
   look(box, onGround = false) {
+    if (onGround) box.min.z = Math.min(box.min.z, 0);
     const middle = box.getCenter(new THREE.Vector3());
     this.size = Math.max(box.getSize(new THREE.Vector3()).length(), 1e-3);
-    if (onGround) middle.z *= 0.6;
     this.controls.target.copy(middle);
     this.camera.position.copy(middle).addScaledVector(new THREE.Vector3(0.35, -1, 0.45).normalize(), (1.5 * this.size) / this.free);
     this.camera.near = 0.01 * this.size;

@@ -40,30 +40,31 @@ export class SurfaceModel {
   }
 }
 
+/** A material whose vertices go where the modes of a model take them. @param amplitudes four to a vector, those of a body */
+export function bending(material, model, amplitudes) {
+  if (model.modes === 0) return material;
+  material.onBeforeCompile = (shader) => {
+    shader.uniforms.modes = { value: model.texture };
+    shader.uniforms.vertices = { value: model.vertices };
+    shader.uniforms.amplitudes = { value: amplitudes };
+    const defines = `#define MODES ${model.modes}\n#define PACKS ${amplitudes.length}\n#define WIDTH ${model.width}\n`;
+    shader.vertexShader = defines + shader.vertexShader.replace('#include <common>', DECLARATIONS)
+      .replace('#include <beginnormal_vertex>', 'vec3 objectNormal = normalize(bent(1, normal));')
+      .replace('#include <begin_vertex>', 'vec3 transformed = bent(0, position);');
+  };
+  material.customProgramCacheKey = () => `bends ${model.modes} ${model.width}`;
+  return material;
+}
+
 /** One body: its pose and amplitudes are set from a slice of the engine's frame. */
 export class SurfaceBody {
   constructor(model, number) {
     this.amplitudes = Array.from({ length: Math.max(1, Math.ceil(model.modes / 4)) }, () => new THREE.Vector4());
     const material = new THREE.MeshStandardMaterial({ color: COLOURS[number % COLOURS.length], roughness: 0.6, side: THREE.DoubleSide });
-    this.mesh = new THREE.Mesh(model.geometry, this.bending(material, model));
-    this.mesh.customDepthMaterial = this.bending(new THREE.MeshDepthMaterial({ depthPacking: THREE.RGBADepthPacking }), model);
+    this.mesh = new THREE.Mesh(model.geometry, bending(material, model, this.amplitudes));
+    this.mesh.customDepthMaterial = bending(new THREE.MeshDepthMaterial({ depthPacking: THREE.RGBADepthPacking }), model, this.amplitudes);
     this.mesh.castShadow = this.mesh.receiveShadow = true;
     this.mesh.frustumCulled = false;
-  }
-
-  bending(material, model) {
-    if (model.modes === 0) return material;
-    material.onBeforeCompile = (shader) => {
-      shader.uniforms.modes = { value: model.texture };
-      shader.uniforms.vertices = { value: model.vertices };
-      shader.uniforms.amplitudes = { value: this.amplitudes };
-      const defines = `#define MODES ${model.modes}\n#define PACKS ${this.amplitudes.length}\n#define WIDTH ${model.width}\n`;
-      shader.vertexShader = defines + shader.vertexShader.replace('#include <common>', DECLARATIONS)
-        .replace('#include <beginnormal_vertex>', 'vec3 objectNormal = normalize(bent(1, normal));')
-        .replace('#include <begin_vertex>', 'vec3 transformed = bent(0, position);');
-    };
-    material.customProgramCacheKey = () => `bends ${model.modes} ${model.width}`;
-    return material;
   }
 
   /** @param frame position, quaternion (w first), amplitudes */

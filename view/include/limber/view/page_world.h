@@ -30,11 +30,13 @@ struct PageSettings {
   double damping = 1.0;                          ///< factor on the decay of every mode; ≥ 0
   double friction = 0.5;                         ///< ≥ 0, where the scene has contact
   ContactSolver solver = kDefaultContactSolver;  ///< not where the scene has one of [H03]'s rules
+  double joint_friction = 1.0;                   ///< factor on the friction in joints; ≥ 0
 };
 
 /// A model once for all its bodies, made for a vertex shader.
 struct PageModel {
   std::string name{};
+  double mass = 0.0;                       ///< kg
   std::vector<float> rest{}, normals{};    ///< 3 V each: of the rest shape, m; unit
   std::vector<std::uint32_t> triangles{};  ///< 3 T
   /// 8 V k: for mode i and vertex v from 8 (i V + v) on the shape (kg^−½), 0, and how the normal, of length 1 at rest,
@@ -64,6 +66,8 @@ class PageWorld {
   /// joints. Names are text of the scene and its assets: nothing that may become markup.
   std::string description() const;
   const std::vector<PageModel>& models() const;
+  /// The surface by which bodies of a model touch, unless they wear a shape; that of models() where there is no other.
+  const PageModel& touching(int model);
   const World& world() const;
 
   PageSettings settings() const;
@@ -88,6 +92,8 @@ class PageWorld {
   /// Per joint: origin and x axis in the world, coordinates (3).
   std::span<const double> joint_frames();
 
+  /// What pressed in the last step: position (world, m) and mean force on the first body (world, N), 3 each.
+  std::span<const double> contacts();
   /// Per sensor how many bodies are in it.
   std::span<const double> sensor_counts();
 
@@ -110,6 +116,14 @@ class PageWorld {
   int pins() const;
   /// @param contact_time s, for the ear alone: Blow::contact_time
   void poke(const PageHit& hit, const Vec3& direction, double contact_time = 1e-3);
+  /// A coordinate of a joint (joint_constraint.h) goes to a place, m or rad, and is held there as by a spring; or goes
+  /// on at a speed, m/s or rad/s; or is left to what the scene has acting on it.
+  /// @throws InvalidArgument for a joint or coordinate that there is not
+  void lead_joint(int joint, int coordinate, double place);
+  void run_joint(int joint, int coordinate, double speed);
+  void leave_joint(int joint, int coordinate);
+  /// Per joint and coordinate (3) where it is led, and its speed; NaN: nowhere, none.
+  std::span<const double> joint_wishes();
   /// Another body of a model.
   void drop(int model, const Vec3& position);
   /// Shows a mode by itself: all others of the body are at rest.
@@ -133,6 +147,11 @@ class PageWorld {
   std::int64_t kept_step(int key) const;
   /// Back, or forth again, to a kept state, to the bit: a hand that held something then holds it again.
   void go_to(int key);
+  /// All that is to be known to go on from here, settings and hands too, for the same scene in the same build.
+  std::vector<std::byte> saved() const;
+  /// Goes on from there, to the bit; what was kept before is forgotten.
+  /// @throws InvalidArgument for bytes that are damaged or of another scene, which then starts anew
+  void restore(std::span<const std::byte> saved);
   /// The kept states, from the first to the last, as an animated GLB (limber/scene/recording.h). A body that
   /// was dropped on the way waits at its place. The world stays where it is.
   std::string recording();
