@@ -1,0 +1,12 @@
+# Untested. An overlay port inside the sources: vcpkg install limber --overlay-ports=packaging/vcpkg
+set(sources "${CURRENT_PORT_DIR}/../..")
+set(parts "")
+foreach(part PRECOMPUTE TOOLS TESTS EXAMPLES PAPERS TBB ASSIMP)
+  list(APPEND parts -DLIMBER_BUILD_${part}=OFF)
+endforeach()
+vcpkg_cmake_configure(SOURCE_PATH "${sources}" OPTIONS ${parts})
+vcpkg_cmake_install()
+vcpkg_cmake_config_fixup(CONFIG_PATH lib/cmake/limber)
+vcpkg_fixup_pkgconfig()
+file(REMOVE_RECURSE "${CURRENT_PACKAGES_DIR}/debug/include" "${CURRENT_PACKAGES_DIR}/debug/share")
+vcpkg_install_copyright(FILE_LIST "${sources}/LICENSE")
