@@ -142,8 +142,11 @@ void GameConstraints::take(std::vector<Block8>& motion) {
     double& sum = taken_[static_cast<std::size_t>(body.component)];
     for (std::int32_t l = 0; l < 8 * body.blocks; ++l) sum += at[l] * at[l];
     rows_.unscale(body, at);
-    for (std::int32_t l = 0; l < 8 * body.blocks; ++l)
-      motion[static_cast<std::size_t>(body.first + l / 8)].v[l % 8] += static_cast<float>(at[l]);
+    for (Block8& block :
+         std::span(motion).subspan(static_cast<std::size_t>(body.first), static_cast<std::size_t>(body.blocks))) {
+      for (std::size_t l = 0; l < 8; ++l) block.v[l] += static_cast<float>(at[l]);
+      at += 8;
+    }
   }
 }
 

@@ -19,8 +19,7 @@ Eigen::Map<const Block> block(const double* at) { return Eigen::Map<const Block>
 
 void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
                     int number) {
-  before_.clear();
-  for (const GameRow& row : rows_) before_.push_back({row.force, row.left, row.hold});
+  before_.swap(rows_);
   rows_.clear(), groups_.clear(), numbers_.clear(), led_.clear();
   const SubstepPlan& plan = bodies.plan();
   length_ = plan.length();

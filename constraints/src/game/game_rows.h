@@ -118,14 +118,7 @@ class GameRows {
   void hold_as_before(double step);
   void scale_turns();
 
-  /// Of a row, in the substep before.
-  struct Held {
-    double force = 0.0, left = 0.0;
-    GameRow::Hold hold = GameRow::Hold::kMet;
-  };
-
-  std::vector<GameRow> rows_;
-  std::vector<Held> before_;
+  std::vector<GameRow> rows_, before_;  // of this substep and of the one before
   std::vector<GameGroup> groups_;
   std::vector<double> numbers_;  // J
   std::vector<Turns> scales_;    // by frame: x/y of its turn
