@@ -102,7 +102,8 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   const BodySurface of_a = surface(point.a.body), of_b = surface(point.b.body);
   PreparedContact& contact = contacts.emplace_back();
   contact.id = point.id;
-  contact.a = make_side(states, point.a, point.normal), contact.b = make_side(states, point.b, -point.normal);
+  make_side(states, point.a, point.normal, contact.a);
+  make_side(states, point.b, -point.normal, contact.b);
   add_corners(contact.a);
   add_corners(contact.b);
   contact.axes = frame_along(point.normal);

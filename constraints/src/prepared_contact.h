@@ -114,18 +114,19 @@ struct PreparedContact {
   }
 };
 
-/// @param inwards the normal, into the body
-inline PreparedSide make_side(const BodyStates& states, const ContactSide& side, const Vec3& inwards) {
-  PreparedSide made{.body = side.body, .rigid_point = side.point_B};
+/// Written where it is to be: a copy would wait for what was just written.
+/// @param inwards the normal, into the body. @param made a new one
+inline void make_side(const BodyStates& states, const ContactSide& side, const Vec3& inwards, PreparedSide& made) {
+  made.body = side.body;
+  made.rigid_point = side.point_B;
   if (side.radius > 0.0 && !states.is_static(side.body)) {
     made.rim = -side.radius * inwards;
     made.rigid_point -= states.pose(side.body, StepTime::kStart).q.conjugate() * made.rim;
   }
-  if (side.triangle < 0 || states.is_static(side.body)) return made;
+  if (side.triangle < 0 || states.is_static(side.body)) return;
   made.model = &states.body(side.body).group->model();
   made.at = {.surface = SurfacePoint::Surface::kCollision, .triangle = side.triangle, .weight = side.weight};
   made.skin = states.body(side.body).group->skin(states.body(side.body).slot);
-  return made;
 }
 
 inline bool flexes(const PreparedSide& side) {

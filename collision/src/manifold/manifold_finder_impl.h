@@ -69,7 +69,7 @@ struct ManifoldFinder::Impl {
   struct {
     std::vector<std::size_t> pairs_of, first_pair_of;  ///< by body: of which pairs it is
     std::vector<Touch> touches;
-    std::vector<std::pair<std::size_t, std::size_t>> touches_of;  ///< by pair: first and end
+    std::vector<std::pair<std::size_t, std::size_t>> touches_of;  ///< by pair: first and end, once asked for
     std::vector<internal::SupportPlane> planes_a, planes_b;
     std::vector<Vec3> own_normals;  ///< of the pair whose planes are sought, into the body that they are sought for
   } seams;
@@ -110,15 +110,12 @@ struct ManifoldFinder::Impl {
                                            const BodyPair& pair) const;
   Measured measure(const internal::KeptPoint& point, const BodyPair& pair, internal::ManifoldWorker& worker) const;
   void level_seams();
-  void list_touches(internal::ManifoldWorker& worker);
   void list_touches(std::size_t pair, internal::ManifoldWorker& worker);
-  std::span<const Touch> touches_of(std::size_t pair) const {
-    const auto& [first, end] = seams.touches_of[pair];
-    return std::span(seams.touches).subspan(first, end - first);
-  }
+  std::span<const Touch> touches_of(std::size_t pair, internal::ManifoldWorker& worker);
   bool touches_along(const Vec3& out) const;
   void list_pairs_of_bodies();
-  void find_planes(std::size_t pair, Index body, std::vector<internal::SupportPlane>& planes);
+  void find_planes(std::size_t pair, Index body, internal::ManifoldWorker& worker,
+                   std::vector<internal::SupportPlane>& planes);
   bool reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const;
   RigidTransform smaller_in_larger(const internal::PairQuery& query, const RigidTransform& X_AB) const;
   double farthest(const internal::PairQuery& query) const;

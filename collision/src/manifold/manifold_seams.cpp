@@ -15,6 +15,7 @@ using internal::PairQuery;
 namespace {
 
 constexpr double kSameNormal = 1e-3;  // length of the difference of two normals that are one
+constexpr std::size_t kNotListed = std::numeric_limits<std::size_t>::max();
 
 }  // namespace
 
@@ -24,14 +25,16 @@ constexpr double kSameNormal = 1e-3;  // length of the difference of two normals
 /// farther, the plane is what both touch along. Manifolds made in this query are made again so, one after the other.
 void ManifoldFinder::Impl::level_seams() {
   bool listed = false;
+  seams.touches.clear();
+  seams.touches_of.assign(pairs.size(), {kNotListed, kNotListed});
   const ManifoldWorkers::Lease worker(workers);
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const BodyPair& pair = pairs[p];
     if (recycled[p] != 0 || graph.at(p).points.empty() || at(pair.a).modal || at(pair.b).modal) continue;
-    if (!listed) list_pairs_of_bodies(), list_touches(*worker);
+    if (!listed) list_pairs_of_bodies();
     listed = true;
-    find_planes(p, pair.a, seams.planes_a);
-    find_planes(p, pair.b, seams.planes_b);
+    find_planes(p, pair.a, *worker, seams.planes_a);
+    find_planes(p, pair.b, *worker, seams.planes_b);
     if (seams.planes_a.empty() && seams.planes_b.empty()) continue;
     PairQuery q = query_of(pair);
     q.planes_a = seams.planes_a, q.planes_b = seams.planes_b;
@@ -40,10 +43,10 @@ void ManifoldFinder::Impl::level_seams() {
   }
 }
 
-void ManifoldFinder::Impl::list_touches(ManifoldWorker& worker) {
-  seams.touches.clear();
-  seams.touches_of.resize(pairs.size());
-  for (std::size_t p = 0; p < pairs.size(); ++p) list_touches(p, worker);
+std::span<const ManifoldFinder::Impl::Touch> ManifoldFinder::Impl::touches_of(std::size_t p, ManifoldWorker& worker) {
+  if (seams.touches_of[p].first == kNotListed) list_touches(p, worker);
+  const auto& [first, end] = seams.touches_of[p];
+  return std::span(seams.touches).subspan(first, end - first);
 }
 
 /// Of what convex bodies touch.
@@ -74,7 +77,8 @@ void ManifoldFinder::Impl::list_pairs_of_bodies() {
 
 /// Planes, in the frame of a convex body of a pair, that it rests on or comes down on beside the other one, to which
 /// that one reaches, and along which not all of the pair's contacts are.
-void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, std::vector<internal::SupportPlane>& planes) {
+void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, ManifoldWorker& worker,
+                                       std::vector<internal::SupportPlane>& planes) {
   planes.clear();
   const Index other = pairs[p].a == body ? pairs[p].b : pairs[p].a;
   const ManifoldBody& me = at(body);
@@ -85,12 +89,12 @@ void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, std::vector<in
     return pairs[of].a == body ? touch.at.normal : Vec3(-touch.at.normal);
   };
   seams.own_normals.clear();
-  for (const Touch& touch : touches_of(p)) seams.own_normals.push_back(out_of_other(touch, p));
+  for (const Touch& touch : touches_of(p, worker)) seams.own_normals.push_back(out_of_other(touch, p));
   for (std::size_t k = seams.first_pair_of[i]; k < seams.first_pair_of[i + 1]; ++k) {
     const std::size_t beside = seams.pairs_of[k];
     if (beside == p) continue;
     Vec3 last = Vec3::Zero();
-    for (const Touch& touch : touches_of(beside)) {
+    for (const Touch& touch : touches_of(beside, worker)) {
       if (touch.lowest > tolerance) continue;
       const Vec3 out = out_of_other(touch, beside);
       if ((out - last).squaredNorm() <= kSameNormal * kSameNormal) continue;  // contacts of a face

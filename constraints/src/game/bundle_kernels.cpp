@@ -430,6 +430,11 @@ HWY_INLINE HWY_ATTR void AddWorks(const BundleContact& c, std::size_t lane, Work
   works.given = hn::MulAdd(kept, before, hn::Add(works.given, Get(c.release, lane)));
 }
 
+HWY_INLINE HWY_ATTR void AddUp(BundleContact& c, std::size_t lane) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    Put(hn::Add(Get(c.sum[axis], lane), Get(c.force[axis], lane)), c.sum[axis], lane);
+}
+
 HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motion) {
   const Lanes d;
   for (std::size_t i = 0; i < all.count; ++i) {
@@ -447,7 +452,10 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
         SolveOne(bundle, c, u, lane, change);
         MoveCoordinates(bundle, c, rows, change, lane, y);
         if (bundle.rolls) RollOne(bundle, c, y.sides, lane);
-        if (!backward) AddWorks(c, lane, works);
+        if (backward)
+          AddUp(c, lane);
+        else
+          AddWorks(c, lane, works);
       }
       WriteCoordinates(all, bundle, motion, lane, y);
       if (backward) continue;
@@ -626,16 +634,6 @@ HWY_ATTR void NoteBundleRebounds(const BundleArrays& all, const Block8* free, co
   }
 }
 
-HWY_ATTR void AddUpBundles(const BundleArrays& all) {
-  for (std::size_t b = 0; b < all.count; ++b)
-    for (std::int32_t k = 0; k < all.bundles[b].count; ++k) {
-      BundleContact& c = all.contacts[all.bundles[b].first + k];
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce)
-          Put(hn::Add(Get(c.sum[axis], lane), Get(c.force[axis], lane)), c.sum[axis], lane);
-    }
-}
-
 }  // namespace limber::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -651,7 +649,6 @@ HWY_EXPORT(FindResiduals);
 HWY_EXPORT(ApplyBundleForces);
 HWY_EXPORT(ScaleBundleForces);
 HWY_EXPORT(NoteBundleRebounds);
-HWY_EXPORT(AddUpBundles);
 
 void make_mode_rows(const ModePoint& point, Block8* rows) { HWY_DYNAMIC_DISPATCH(MakeModeRows)(point, rows); }
 
@@ -687,8 +684,6 @@ void scale_bundle_forces(const BundleArrays& bundles, const Block8* shares) {
 void note_bundle_rebounds(const BundleArrays& bundles, const Block8* free, const Block8* motion) {
   HWY_DYNAMIC_DISPATCH(NoteBundleRebounds)(bundles, free, motion);
 }
-
-void add_up_bundles(const BundleArrays& bundles) { HWY_DYNAMIC_DISPATCH(AddUpBundles)(bundles); }
 
 }  // namespace limber::internal
 #endif

@@ -77,8 +77,8 @@ void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes);
 /// stands at their end. @param shapes with a block of zeros at theirs
 void measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
                      float most);
-/// As sweep_contacts(); a forward one tells bundles what their forces do. @param motion with a block of zeros at its
-/// end
+/// As sweep_contacts(); a forward one tells bundles what their forces do, a backward one adds them up. @param motion
+/// with a block of zeros at its end
 void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion);
 /// As push_contacts(). @param pushes with a block of zeros at their end
 void push_bundles(const BundleArrays& bundles, bool backward, Block8* pushes);
@@ -90,7 +90,5 @@ void apply_bundle_forces(const BundleArrays& bundles, Block8* motion);
 void scale_bundle_forces(const BundleArrays& bundles, const Block8* shares);
 /// As note_rebounds(). @param free, motion with a block of zeros at their end
 void note_bundle_rebounds(const BundleArrays& bundles, const Block8* free, const Block8* motion);
-/// Adds up forces.
-void add_up_bundles(const BundleArrays& bundles);
 
 }  // namespace limber::internal

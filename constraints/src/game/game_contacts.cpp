@@ -377,10 +377,7 @@ void GameContacts::push_apart(GameBodies& bodies, bool backward, Jobs& jobs) {
 void GameContacts::end_substep(const GameBodies& bodies, Jobs& jobs) {
   const Block8* free = bodies.free_motion().data();
   const Block8* motion = bodies.motion().data();
-  bundles_.for_all(jobs, [&](const BundleArrays& part) {
-    note_bundle_rebounds(part, free, motion);
-    add_up_bundles(part);
-  });
+  bundles_.for_all(jobs, [&](const BundleArrays& part) { note_bundle_rebounds(part, free, motion); });
   note_rebounds(rows_.data(), rows_.size(), blocks_.data(), free, motion);
   for (std::size_t i = 0; i < rows_.size(); ++i)
     for (int axis = 0; axis < 3; ++axis) sums_[i][axis] += static_cast<double>(rows_[i].force[axis]);

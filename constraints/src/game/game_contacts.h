@@ -54,7 +54,7 @@ class GameContacts {
   void limit_forces(GameBodies& bodies, std::span<const double> moved, Jobs& jobs);
   void sweep(GameBodies& bodies, bool backward, Jobs& jobs);
   void push_apart(GameBodies& bodies, bool backward, Jobs& jobs);
-  /// Adds up forces.
+  /// Notes what rebounds, and adds up the forces of rows outside of bundles.
   void end_substep(const GameBodies& bodies, Jobs& jobs);
   /// Tells the contacts what acted on them.
   void end_step(const SubstepPlan& plan);
