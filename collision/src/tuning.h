@@ -129,6 +129,20 @@ struct ImpactTuning {
   double worth_a_look = 0.9;
 };
 
+/// Manifolds of pairs that live from step to step.
+struct ManifoldTuning {
+  /// What was kept counts as this much farther out [1 to 1.5] and, by part of the patch's extent, deeper [0 to 1e-2],
+  /// so that round-off does not change contacts. By judgement. [path] for each
+  double kept_distance = 1.1, kept_depth = 1e-3;
+  double like_normals = 0.94;  ///< cosine, 20°, from which contacts are of one patch [10° to 30°]. [path]
+  /// Length of the difference of normals of faces that are flush, or of one face [1e-4 to 1e-2]. [path]
+  double same_normal = 1e-3;
+  double leaning = 1e-3;  ///< sine by which what meets at a feature may lean out of its cone [1e-6 to 1e-2]. [path]
+  /// Sine up to which triangles of a mesh lie in one plane [1e-6 to 1e-3]: far above the round-off of coordinates in
+  /// single precision. [path]
+  double one_plane = 1e-4;
+};
+
 /// Contacts by samples of one surface in the distance field of another.
 struct FieldTuning {
   int cells = 48;  ///< of the grid of distances, along its longest side [24 to 96]
@@ -149,7 +163,10 @@ struct FieldTuning {
   double slack = 0.5;
   /// Sine, 64°, by which a vertex's surface may lean back from the plane by which it leaves [0.7 to 0.95]. [path]
   double leaning = 0.9;
-  double least_patch = 0.1;   ///< of its area below which a patch's area vector is no direction [0.01 to 0.3] [path]
+  double least_patch = 0.1;  ///< of its area below which a patch's area vector is no direction [0.01 to 0.3] [path]
+  /// Of the other body's longest side, cells of a field that is fine enough for it [4 to 16]. [path] Otherwise
+  /// triangles.
+  double cells_of_the_other = 8.0;
   double deepest_exit = 2.0;  ///< of its deepest nearest point: a patch's longest way out [1.4 to 4]. [path]
 };
 
@@ -160,6 +177,7 @@ struct CollisionTuning {
   NarrowTuning narrow{};
   FinderTuning finder{};
   ImpactTuning impact{};
+  ManifoldTuning manifold{};
   FieldTuning field{};
 };
 

@@ -113,6 +113,12 @@ struct SmallStepTuning {
   /// Neighbours of a node of joints up to which its elimination may join them. [path] Trees need none beside those that
   /// share a body; machines of a few loops are below it.
   std::size_t most_joined = 8;
+  /// Part of the static displacement, or of that of a free mass, that a mode answers with at least: its held answer
+  /// comes to nothing at ω h = 2πn, and a coordinate has a size there all the same.
+  double least_answer = 1e-4;
+  /// Part of a row's own response that is added to its diagonal: far above what is lost to round-off in a pivot, far
+  /// below what the lightest of bodies on the heaviest chain leaves.
+  double regular = 1e-9;
   int most_gradients = 8;  ///< steps of conjugate gradients where joints of many loops are not joined. [path]
 };
 

@@ -6,11 +6,10 @@
 #include <numbers>
 #include <utility>
 
+#include "tuning.h"
+
 namespace limber::internal {
 namespace {
-
-// Of a body's thickness: contacts are found so far beyond where its own motion takes it.
-constexpr double kSpeculativeMargin = 0.01;
 
 void expect_to_stay(BodyState& state) {
   state.doubt = 0.0;
@@ -91,7 +90,7 @@ void MotionForecast::write_awake(Index body) {
   BodyState& state = states_[static_cast<std::size_t>(body)];
   state = {.pose = group.frame(e.slot).pose()};
   if (!e.shape) state.amplitudes = group.amplitudes(e.slot);
-  state.doubt = kSpeculativeMargin * e.extent.thickness;
+  state.doubt = kEngineTuning.speculative_margin * e.extent.thickness;
   const bool steady = group.frame_constants().motion == FrameMotion::kFree && (e.shape || !group.skinned(e.slot));
   if (steady)
     expect_steady(body, state);

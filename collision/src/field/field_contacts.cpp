@@ -163,10 +163,10 @@ bool FieldContacts::serves(const FieldBody& a, const FieldBody& b) {
     return body.shell != nullptr ? body.shell->shell().resolved() : is_half_space(body) || capsule_of(body, capsule);
   };
   if (!known(a) || !known(b) || (a.shell == nullptr && b.shell == nullptr)) return false;
-  constexpr double kCellsOfTheOther = 8.0;
+  const double cells = collision_tuning().field.cells_of_the_other;
   const auto fine = [&](const FieldBody& field, const FieldBody& other) {
     return field.shell == nullptr || field.shell->shell().distance().kind == DistanceView::Kind::kBox ||
-           is_half_space(other) || field.shell->shell().cell() * kCellsOfTheOther <= longest_side(other);
+           is_half_space(other) || field.shell->shell().cell() * cells <= longest_side(other);
   };
   return fine(a, b) && fine(b, a);
 }

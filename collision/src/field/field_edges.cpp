@@ -5,6 +5,8 @@
 #include <limits>
 #include <tuple>
 
+#include "tuning.h"
+
 namespace limber::internal {
 namespace {
 
@@ -88,8 +90,8 @@ bool FieldEdges::nearest_of_edges(Index e, Index f, EdgePair& pair) const {
   const Vec3f n = u.cross(w);
   const float n2 = n.squaredNorm();
   // Directions of lines nearer to parallel are noise in single precision.
-  constexpr float kParallel = 1e-4f;
-  if (!(n2 > kParallel * kParallel * u.squaredNorm() * w.squaredNorm())) return false;
+  const auto parallel = static_cast<float>(collision_tuning().narrow.parallel_touching);
+  if (!(n2 > parallel * parallel * u.squaredNorm() * w.squaredNorm())) return false;
   const float s = r.cross(w).dot(n) / n2, t = r.cross(u).dot(n) / n2;
   if (!(s > 0.0f && s < 1.0f && t > 0.0f && t < 1.0f)) return false;
   pair = {e, f, s, t, a0 + s * u, b0 + t * w, n / std::sqrt(n2), 0.0f};

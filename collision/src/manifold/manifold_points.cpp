@@ -5,11 +5,10 @@
 #include <limits>
 #include <utility>
 
+#include "tuning.h"
+
 namespace limber::internal {
 namespace {
-
-constexpr double kKeptDistance = 1.1;  // by which what was kept counts as farther
-constexpr double kKeptDepth = 1e-3;    // part of the extent by which it counts as deeper
 
 class Choice {
  public:
@@ -35,20 +34,21 @@ class Choice {
   std::size_t deepest() const {
     double extent = 0.0;
     for (const FeatureContact& c : patch_) extent = std::max(extent, across(patch_[0], c).norm());
+    const double deeper = collision_tuning().manifold.kept_depth * extent;
     std::size_t best = 0;
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < patch_.size(); ++i)
-      if (const double gap = patch_[i].gap - (kept(patch_[i]) ? kKeptDepth * extent : 0.0); gap < least)
-        least = gap, best = i;
+      if (const double gap = patch_[i].gap - (kept(patch_[i]) ? deeper : 0.0); gap < least) least = gap, best = i;
     return best;
   }
   template <class Distance>
   std::size_t best(const Distance& distance) const {
+    const double farther = collision_tuning().manifold.kept_distance;
     std::size_t best = count_;
     double most = -std::numeric_limits<double>::infinity();
     for (std::size_t i = best; i < patch_.size(); ++i) {
       const FeatureContact& c = patch_[i];
-      const double value = (kept(c) ? kKeptDistance : 1.0) * distance(c) - (c.gap - deepest_gap_);
+      const double value = (kept(c) ? farther : 1.0) * distance(c) - (c.gap - deepest_gap_);
       if (value > most) most = value, best = i;
     }
     return best;
@@ -81,7 +81,7 @@ std::size_t choose_manifold_points(std::span<FeatureContact> patch, std::span<co
 }
 
 void keep_manifold_points(std::vector<FeatureContact>& found, std::span<const std::uint64_t> last) {
-  constexpr double kLikeNormals = 0.94;  // cosine of 20°
+  const double like_normals = collision_tuning().manifold.like_normals;
   const auto deeper = [](const FeatureContact& c, const FeatureContact& d) {
     return std::pair(c.gap, feature_pair(c)) < std::pair(d.gap, feature_pair(d));
   };
@@ -90,7 +90,7 @@ void keep_manifold_points(std::vector<FeatureContact>& found, std::span<const st
     std::iter_swap(begin, std::min_element(begin, found.end(), deeper));
     const Vec3 normal = begin->normal;
     const auto end = std::partition(begin + 1, found.end(),
-                                    [&](const FeatureContact& c) { return c.normal.dot(normal) > kLikeNormals; });
+                                    [&](const FeatureContact& c) { return c.normal.dot(normal) > like_normals; });
     const std::size_t chosen = choose_manifold_points({&*begin, static_cast<std::size_t>(end - begin)}, last);
     std::copy_n(begin, chosen, found.begin() + static_cast<std::ptrdiff_t>(kept));
     kept += chosen;

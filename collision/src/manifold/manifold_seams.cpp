@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "manifold/manifold_finder_impl.h"
+#include "tuning.h"
 
 namespace limber {
 
@@ -14,7 +15,6 @@ using internal::PairQuery;
 
 namespace {
 
-constexpr double kSameNormal = 1e-3;  // length of the difference of two normals that are one
 constexpr std::size_t kNotListed = std::numeric_limits<std::size_t>::max();
 
 }  // namespace
@@ -83,7 +83,8 @@ void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, ManifoldWorker
   const Index other = pairs[p].a == body ? pairs[p].b : pairs[p].a;
   const ManifoldBody& me = at(body);
   if (me.core() == nullptr || at(other).half_space() != nullptr) return;
-  const double tolerance = options.flush * std::min(me.thickness, at(other).thickness);
+  const double tolerance = options.flush * std::min(me.thickness, at(other).thickness),
+               same_normal = internal::collision_tuning().manifold.same_normal;
   const auto i = static_cast<std::size_t>(body);
   const auto out_of_other = [&](const Touch& touch, std::size_t of) {
     return pairs[of].a == body ? touch.at.normal : Vec3(-touch.at.normal);
@@ -97,7 +98,7 @@ void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, ManifoldWorker
     for (const Touch& touch : touches_of(beside, worker)) {
       if (touch.lowest > tolerance) continue;
       const Vec3 out = out_of_other(touch, beside);
-      if ((out - last).squaredNorm() <= kSameNormal * kSameNormal) continue;  // contacts of a face
+      if ((out - last).squaredNorm() <= same_normal * same_normal) continue;  // contacts of a face
       last = out;
       if (touches_along(out)) continue;
       const double offset = pairs[beside].a == body ? out.dot(touch.at.p_b)
@@ -109,8 +110,9 @@ void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, ManifoldWorker
 }
 
 bool ManifoldFinder::Impl::touches_along(const Vec3& out) const {
+  const double same_normal = internal::collision_tuning().manifold.same_normal;
   return std::ranges::all_of(seams.own_normals,
-                             [&](const Vec3& own) { return (own - out).squaredNorm() <= kSameNormal * kSameNormal; });
+                             [&](const Vec3& own) { return (own - out).squaredNorm() <= same_normal * same_normal; });
 }
 
 /// Whether a convex body reaches to normal · x = offset, x from its origin, and no farther; of meshes each triangle is

@@ -4,13 +4,10 @@
 #include <limits>
 
 #include "limber/collision/tree_traversal.h"
+#include "tuning.h"
 
 namespace limber::internal {
 namespace {
-
-// Sine by which what meets at a feature may lean out of its Voronoi cone.
-constexpr double kLeaning = 1e-3;
-constexpr double kFlushNormal = 1e-3;  // length of the difference of a face's normal and that of what it is flush with
 
 /// Whether it reaches to the plane and no farther.
 bool reaches_to(PairSurface& mesh, Index t, const SupportPlane& plane) {
@@ -22,8 +19,9 @@ bool reaches_to(PairSurface& mesh, Index t, const SupportPlane& plane) {
 
 /// Whether a contact along a direction goes: all that meets at the feature reaches to a plane that the body rests on.
 bool is_beneath(PairSurface& mesh, std::span<const SupportPlane> planes, FeatureKey feature, const Vec3& out) {
+  const double same_normal = collision_tuning().manifold.same_normal;
   return std::ranges::any_of(planes, [&](const SupportPlane& plane) {
-    if ((out - plane.normal).norm() <= kFlushNormal) return false;
+    if ((out - plane.normal).norm() <= same_normal) return false;
     bool all = true;
     mesh.for_faces_at(feature, [&](Index t) { all = all && reaches_to(mesh, t, plane); });
     return all;
@@ -40,22 +38,23 @@ bool holds(PairSurface& mesh, const Vec3& p) {
 /// The vertices that reach farthest along the direction are a vertex or an edge; nothing beside it may reach farther.
 bool MeshContacts::Cone::allows(const Vec3& out) {
   const PairSurface::Face& face = mesh->face(triangle);
-  if (face.normal.dot(out) < -kLeaning) return false;
+  const double leaning = collision_tuning().manifold.leaning;
+  if (face.normal.dot(out) < -leaning) return false;
   std::array<double, 3> height;
   for (std::size_t c = 0; c < 3; ++c) height[c] = out.dot(face.x[c]);
   const auto top = static_cast<std::size_t>(std::max_element(height.begin(), height.end()) - height.begin());
   for (std::size_t c = 0; c < 3; ++c) {
     const std::size_t d = (c + 1) % 3;
-    const double level = kLeaning * (face.x[d] - face.x[c]).norm();
+    const double level = leaning * (face.x[d] - face.x[c]).norm();
     if (std::min(height[c], height[d]) < height[top] - level) continue;
     nearest = feature_key(Feature::Kind::kEdge, mesh->surface().edge_of(triangle, static_cast<int>(c)));
     FeatureSide edge;
     edge.key = nearest;
-    if (mesh->behind(edge, out, kLeaning)) return true;
+    if (mesh->behind(edge, out, leaning)) return true;
   }
   FeatureSide vertex;
   vertex.key = nearest = feature_key(Feature::Kind::kVertex, mesh->surface().triangle(triangle)[top]);
-  return mesh->behind(vertex, out, kLeaning);
+  return mesh->behind(vertex, out, leaning);
 }
 
 void MeshContacts::find(const Query& q, std::vector<FeatureContact>& found) {
@@ -93,8 +92,9 @@ void MeshContacts::find_rounded(const Query& q) {
   const auto is_behind = [&](const FeatureContact& c) { return c.normal.dot(middle - c.a.point) > 0.0; };
   const bool crosses = std::any_of(found_->begin() + static_cast<std::ptrdiff_t>(first), found_->end(), is_behind) &&
                        !holds(q.mesh, middle);
+  const double leaning = collision_tuning().manifold.leaning;
   const auto goes = [&](const FeatureContact& c) {
-    return !q.mesh.behind(c.a, -c.normal, kLeaning) || is_beneath(q.mesh, q.planes, c.a.key, -c.normal) ||
+    return !q.mesh.behind(c.a, -c.normal, leaning) || is_beneath(q.mesh, q.planes, c.a.key, -c.normal) ||
            (crosses && is_behind(c));
   };
   found_->erase(std::remove_if(found_->begin() + static_cast<std::ptrdiff_t>(first), found_->end(), goes),
@@ -158,7 +158,7 @@ void MeshContacts::on_triangle(const Query& q, Index t) {
   bool flush = false;
   for (const SupportPlane& plane : q.planes) {
     if (!reaches_to(q.mesh, t, plane)) continue;
-    if ((face.normal - plane.normal).norm() > kFlushNormal) return;
+    if ((face.normal - plane.normal).norm() > collision_tuning().manifold.same_normal) return;
     flush = true;
   }
   ConvexContacts::TriangleQuery query{q.reach, q.passing, q.facets.has_active_edge(t) && !flush, flush};

@@ -3,12 +3,10 @@
 #include <algorithm>
 
 #include "limber/mesh/closest_point.h"
+#include "tuning.h"
 
 namespace limber::internal {
 namespace {
-
-// Sine up to which two triangles lie in one plane: far above the round-off of coordinates in single precision.
-constexpr double kFlat = 1e-4;
 
 TrianglePoints corners(const CollisionSurface& s, Index t) {
   const auto& [a, b, c] = s.triangle(t);
@@ -36,16 +34,17 @@ MeshFacets::MeshFacets(const CollisionSurface& surface) {
 /// From each triangle that is in none over all neighbours in its plane, so that a surface that bends little by little
 /// does not become one.
 void MeshFacets::grow_facets(const CollisionSurface& s) {
+  const double one_plane = collision_tuning().manifold.one_plane;
   facet_.assign(normal_.size(), -1);
   std::vector<Index> front;
   for (Index seed = 0; seed < s.triangles(); ++seed) {
     if (facet(seed) >= 0) continue;
     const Vec3 &n = normal_[static_cast<std::size_t>(seed)], x = corners(s, seed)[0];
     const auto in_plane = [&](Index t) {
-      if (!((normal_[static_cast<std::size_t>(t)] - n).norm() <= kFlat)) return false;
+      if (!((normal_[static_cast<std::size_t>(t)] - n).norm() <= one_plane)) return false;
       const TrianglePoints points = corners(s, t);
       return std::ranges::all_of(
-          points, [&](const Vec3& p) { return std::abs(n.dot(p - x)) <= kFlat * (points[1] - points[0]).norm(); });
+          points, [&](const Vec3& p) { return std::abs(n.dot(p - x)) <= one_plane * (points[1] - points[0]).norm(); });
     };
     front.assign(1, seed);
     facet_[static_cast<std::size_t>(seed)] = seed;
@@ -71,7 +70,7 @@ bool MeshFacets::is_active(const CollisionSurface& s, Index edge) const {
   const auto& other = s.triangle(triangles[1]);
   return std::ranges::all_of(other, [&](Index v) {
     const Vec3 d = s.rest(v) - on_edge;
-    return n.dot(d) <= kFlat * d.norm();
+    return n.dot(d) <= collision_tuning().manifold.one_plane * d.norm();
   });
 }
 

@@ -8,8 +8,7 @@
 namespace limber::internal {
 namespace {
 
-// Far above what is lost to round-off in a pivot, far below what the lightest of bodies on the heaviest chain leaves.
-constexpr double kRegular = 1e-9;
+constexpr double kRegular = kConstraintsTuning.small_steps.regular;
 
 /// Three, the rows of a ball joint, or as many as are given: kernels below come for both.
 template <int fixed>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../tuning.h"
 #include "limber/dynamics/oscillator.h"
 
 namespace limber::internal {
@@ -14,9 +15,7 @@ struct ModeAnswer {
   double rest_rate = 0.0;  // κ, under a steady force
 };
 
-// H comes to nothing at ω h = 2πn. A coordinate scaled by √ρ has a size there all the same: this share of the static
-// displacement, or of that of a free mass.
-constexpr double kLeastAnswer = 1e-4;
+constexpr double kLeastAnswer = kConstraintsTuning.small_steps.least_answer;
 
 ModeAnswer answer_of(const Mode& mode, double h) {
   const ModePropagator p = propagator(mode, h);
