@@ -192,6 +192,7 @@ struct Work {
   std::vector<DetectedJoint> joints;
   std::vector<bool> limits_kept;      ///< per joint: the kept file's limits stand
   std::vector<RangeOfMotion> ranges;  ///< per joint; empty with --no-limits
+  std::vector<JointCoupling> couplings;
 };
 
 Assembly take_apart(const Arguments& a, const Work& work) {
@@ -244,6 +245,7 @@ void find_limits(const Arguments& a, Program& program, Jobs& jobs, Work& work) {
     joint.joint = work.ranges[j].joint;
     joint.reasons.insert(joint.reasons.end(), work.ranges[j].reasons.begin(), work.ranges[j].reasons.end());
   }
+  work.couplings = joint_couplings(work.ranges);
 }
 
 // Text for people -----------------------------------------------------------------------------------------------------
@@ -285,10 +287,17 @@ std::string kind_text(const JointSpec& joint) {
   return fmt::format("{} with pitch {:.4g} per rad", to_string(joint.type), joint.pitch);
 }
 
+std::string coupling_text(const JointCoupling& c) {
+  if (!c.even) return fmt::format(", moved by joint {}", c.first.joint);
+  return fmt::format(", {} times joint {}", ratio_text(c), c.first.joint);
+}
+
 std::string joint_text(const Work& work, std::size_t number, bool explain, bool limits) {
   const DetectedJoint& j = work.joints[number];
   const auto name = [&](Index c) { return work.assembly.components[static_cast<std::size_t>(c)].name; };
-  const std::string range = limits ? limits_text(j.joint) : "";
+  std::string range = limits ? limits_text(j.joint) : "";
+  for (const JointCoupling& c : work.couplings)
+    if (c.second.joint == number) range += coupling_text(c);
   std::string text = fmt::format("{:>4}  {:<12} {:.2f}  \"{}\" - \"{}\"{}\n", number, to_string(j.joint.type),
                                  j.confidence, name(j.a), name(j.b), range.empty() ? "" : ": " + range);
   if (!explain) return text;
@@ -363,7 +372,8 @@ void write_robot(Program& program, const Arguments& a, const Work& work, const s
                                  RobotOptions{.name = file.stem().string(),
                                               .mesh_folder = folder.filename().string(),
                                               .density = a.density,
-                                              .metres_per_unit = metres_per_unit(a)});
+                                              .metres_per_unit = metres_per_unit(a),
+                                              .couplings = work.couplings});
   program.write_file(file, robot.text);
   for (const std::string& warning : robot.warnings)  // both formats tell of the same masses
     if (auto& told = program.warnings(); std::find(told.begin(), told.end(), warning) == told.end())
@@ -414,7 +424,7 @@ void find_joints(Program& program, const Arguments& a) {
     });
   write_files(program, a, work);
 
-  const Kinematics kinematics = overall_kinematics(work.assembly, work.joints);
+  const Kinematics kinematics = overall_kinematics(work.assembly, work.joints, work.couplings);
   fill_report(program.report(), work, kinematics);
   program.report()["seconds"] = stopwatch.seconds();
   program.print(summary(work, kinematics));

@@ -101,7 +101,17 @@ TEST(CoupledMotion, GearsTurnEachOther) {
     EXPECT_LE(coupled.ratio.low, ratio);
     EXPECT_GE(coupled.ratio.high, ratio);
     EXPECT_LT(coupled.ratio.high - coupled.ratio.low, 0.02);
+    EXPECT_NEAR(coupled.as_read, ratio, 0.1);  // within the play corners of facets lead
   }
+  const std::vector<JointCoupling> couplings = joint_couplings(ranges);
+  ASSERT_EQ(couplings.size(), 1u);
+  EXPECT_TRUE(couplings[0].even);
+  EXPECT_EQ(couplings[0].first.joint, 0u);
+  EXPECT_EQ(couplings[0].second.joint, 1u);
+  EXPECT_EQ(couplings[0].ratio, -2.0 / 3.0);
+  EXPECT_EQ(ratio_text(couplings[0]), "-0.6667 (-2/3)");
+  EXPECT_EQ(overall_kinematics(assembly, joints).mobility, 2);
+  EXPECT_EQ(overall_kinematics(assembly, joints, couplings).mobility, 1);
   EXPECT_THAT(ranges[0].reasons, Contains(HasSubstr("coupled with joint 1, \"plate\" - \"large\"")));
   EXPECT_THAT(ranges[0].reasons, Contains(HasSubstr("(-2/3)")));
 }
@@ -136,6 +146,12 @@ TEST(CoupledMotion, APinionGoesAsFarAsItsRackDoes) {
   ASSERT_EQ(ranges[0].joint.type, JointType::kPrismatic);
   EXPECT_NEAR(ranges[0].joint.limits.translation[0].high, kWay, 1e-3);
   EXPECT_NEAR(ranges[0].joint.limits.translation[0].low, -kWay, 1e-3);
+  const std::vector<JointCoupling> couplings = joint_couplings(ranges);
+  ASSERT_EQ(couplings.size(), 1u);
+  EXPECT_FALSE(couplings[0].first.turns);
+  EXPECT_TRUE(couplings[0].second.turns);
+  EXPECT_NEAR(couplings[0].ratio, -1.0 / kRadius, 0.05 / kRadius);
+  EXPECT_EQ(overall_kinematics(assembly, joints, couplings).mobility, 1);
 }
 
 TEST(CoupledMotion, WedgesThatStopEachOtherOnOneSideAreNot) {

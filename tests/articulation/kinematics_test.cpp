@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "limber/articulation/detect_joints.h"
+#include "limber/core/error.h"
 
 namespace limber {
 namespace {
@@ -45,6 +46,36 @@ TEST(Kinematics, FourBarLinkagesMoveOneByOneHoweverMany) {
     EXPECT_EQ(all.kutzbach, -2 * count);  // 4 − 6 for each
     EXPECT_EQ(all.mobility, count);
   }
+}
+
+// Gears in a row turn together; in a ring they do if their number is even.
+TEST(Kinematics, GearsInARingTurnIfTheirNumberIsEven) {
+  for (const std::size_t gears : {3u, 4u, 5u, 6u}) {
+    Assembly assembly;
+    assembly.components.resize(1 + gears);
+    for (Component& c : assembly.components) c.diagonal = 1.0;
+    std::vector<DetectedJoint> joints(gears);
+    std::vector<JointCoupling> couplings;
+    const auto teeth = [&](std::size_t gear) { return static_cast<double>(10 + 3 * (gear % gears)); };
+    for (std::size_t i = 0; i < gears; ++i) {
+      joints[i].a = 0, joints[i].b = static_cast<Index>(1 + i);
+      joints[i].joint.type = JointType::kRevolute;
+      joints[i].joint.frame.origin = Vec3(5.0 * static_cast<double>(i), 1.0, 0.0);
+      couplings.push_back({{i, true}, {(i + 1) % gears, true}, -teeth(i) / teeth(i + 1), true});
+    }
+    const std::span<const JointCoupling> all = couplings;
+    EXPECT_EQ(overall_kinematics(assembly, joints).mobility, static_cast<Index>(gears));
+    EXPECT_EQ(overall_kinematics(assembly, joints, all.first(gears - 1)).mobility, 1);
+    EXPECT_EQ(overall_kinematics(assembly, joints, all).mobility, gears % 2 == 0 ? 1 : 0);
+    EXPECT_EQ(overall_kinematics(assembly, joints, all).kutzbach, 0);
+  }
+}
+
+TEST(Kinematics, CouplingsOfAxesThatJointsLackAreRefused) {
+  FourBars bars(1);
+  const JointCoupling slide{{0, true}, {1, false}, 2.0, true}, none{{0, true}, {9, true}, 2.0, true};
+  for (const JointCoupling& c : {slide, none})
+    EXPECT_THROW(overall_kinematics(bars.assembly, bars.joints, {&c, 1}), InvalidArgument);
 }
 
 }  // namespace

@@ -325,6 +325,61 @@ TEST_F(RobotFiles, ClosedChainsAreConstraintsInMjcfAndRemarksInUrdf) {
   EXPECT_THAT(urdf.text, HasSubstr("<!-- closed chain"));
 }
 
+/// A plate with a row of parts: two gears, a screw that the second one drives, a rack.
+TEST_F(RobotFiles, CouplingsAreMimicsInUrdfAndEqualitiesInMjcf) {
+  Assembly assembly;
+  std::vector<DetectedJoint> joints;
+  assembly.components.push_back(box_component("plate", {0, 0, 0}, {20, 3, 1}));
+  const JointType types[] = {JointType::kRevolute, JointType::kRevolute, JointType::kCylindrical,
+                             JointType::kPrismatic};
+  for (Index i = 0; i < 4; ++i) {
+    assembly.components.push_back(box_component("g" + std::to_string(i), Vec3(4.0 * i, 0, 1), Vec3(4.0 * i + 1, 1, 2)));
+    joints.push_back(placed_joint(0, i + 1, types[i], {4.0 * i, 0.5, 1.5}, {0.3, 0.2 * i, 0.1}));
+  }
+  joints[2].joint.pitch = 0.5;
+  constexpr double kUnit = 0.001;
+  const std::vector<JointCoupling> couplings{
+      {{0, true}, {1, true}, -1.5, true}, {{2, true}, {1, true}, 3.0, true}, {{3, false}, {0, true}, 0.25, true}};
+  const RobotOptions options{.metres_per_unit = kUnit, .couplings = couplings};
+  // Of each speed to the first gear's, rad and m.
+  const std::map<std::string, double> expected{
+      {"plate__g1", -1.5}, {"plate__g2_rx", -0.5}, {"plate__g2_tx", -0.5 * 0.5 * kUnit}, {"plate__g3", 4.0 * kUnit}};
+  const RobotFile urdf = urdf_file(assembly, joints, options);
+  EXPECT_THAT(urdf.warnings, ::testing::IsEmpty());
+  const auto robot = urdf::parseURDF(urdf.text);
+  ASSERT_NE(robot, nullptr);
+  EXPECT_EQ(robot->getJoint("plate__g0")->mimic, nullptr);
+  for (const auto& [name, ratio] : expected) {
+    ASSERT_NE(robot->getJoint(name)->mimic, nullptr) << name;
+    EXPECT_EQ(robot->getJoint(name)->mimic->joint_name, "plate__g0");
+    EXPECT_NEAR(robot->getJoint(name)->mimic->multiplier, ratio, kRoundOff);
+  }
+  const MujocoModel mj(write(mjcf_file(assembly, joints, options), "gears.xml"));
+  ASSERT_NE(mj.model, nullptr);
+  ASSERT_EQ(mj.model->neq, 4);
+  // Where the coordinates follow the first gear's, the equalities are met; elsewhere not.
+  mj.data->qpos[mj.model->jnt_qposadr[mj.joint("plate__g0")]] = 0.7;
+  for (const auto& [name, ratio] : expected) mj.data->qpos[mj.model->jnt_qposadr[mj.joint(name)]] = 0.7 * ratio;
+  const auto worst = [&] {
+    mj_forward(mj.model, mj.data);
+    double most = 0.0;
+    for (int i = 0; i < mj.data->ne; ++i) most = std::max(most, std::abs(mj.data->efc_pos[i]));
+    return most;
+  };
+  EXPECT_LT(worst(), kRoundOff);
+  EXPECT_EQ(mj.data->ne, 4);
+  mj.data->qpos[mj.model->jnt_qposadr[mj.joint("plate__g0")]] = 0.6;
+  EXPECT_NEAR(worst(), 0.15, kRoundOff);
+}
+
+TEST_F(RobotFiles, CouplingsThatNoFormatSaysAreTold) {
+  const Machine m;
+  const JointCoupling uneven{{0, true}, {2, true}, 0.3, false}, missing{{0, true}, {1, true}, 2.0, true};
+  EXPECT_THAT(urdf_file(m.assembly, m.joints, {.couplings = {uneven}}).warnings,
+              ::testing::Contains(HasSubstr("its ratio changes on the way")));
+  EXPECT_THROW(mjcf_file(m.assembly, m.joints, {.couplings = {missing}}), InvalidArgument);  // a ball
+}
+
 TEST_F(RobotFiles, LonePartsAndSheetsAreReadToo) {
   Assembly assembly;
   assembly.components = {box_component("a<b", {0, 0, 0}, {1, 1, 1}), box_component("a>b", {2, 0, 0}, {3, 1, 1})};

@@ -35,6 +35,65 @@ std::vector<std::size_t> by_rank(const std::vector<DetectedJoint>& joints) {
 
 Interval scaled(const Interval& i, double by) { return {by * i.low, by * i.high}; }
 
+/// Freedoms that go along with each other, by screws and couplings: the first of each such set leads all others.
+class Leading {
+ public:
+  Leading(KinematicTree& tree, const std::vector<DetectedJoint>& joints, const RobotOptions& options) : tree_(tree) {
+    for (std::size_t i = 0; i < tree.links.size(); ++i) {
+      const TreeLink& link = tree.links[i];
+      for (std::size_t f = 0; f < link.freedoms.size(); ++f) nodes_.push_back({i, f});
+      const double pitch = link.parent < 0 ? 0.0 : joints[link.joint].joint.pitch;
+      if (pitch != 0.0) edges_.push_back({nodes_.size() - 2, nodes_.size() - 1, options.metres_per_unit * pitch});
+    }
+    const auto metres = [&](const JointAxis& axis) { return axis.turns ? 1.0 : options.metres_per_unit; };
+    for (std::size_t c = 0; c < options.couplings.size(); ++c) {
+      const JointCoupling& coupling = options.couplings[c];
+      const std::size_t first = node(coupling.first), second = node(coupling.second);
+      if (coupling.even && std::max(first, second) < nodes_.size())
+        edges_.push_back({first, second, coupling.ratio * metres(coupling.second) / metres(coupling.first)});
+      else
+        tree.uncoupled.push_back(c);
+    }
+  }
+
+  void lead() {
+    std::vector<bool> seen(nodes_.size(), false);
+    for (std::size_t first = 0; first < nodes_.size(); ++first) {
+      if (seen[first]) continue;
+      seen[first] = true;
+      std::vector<std::pair<std::size_t, double>> open{{first, 1.0}};
+      for (std::size_t i = 0; i < open.size(); ++i)
+        for (const Edge& e : edges_)
+          for (const auto& [from, to, ratio] : {e, Edge{e.to, e.from, 1.0 / e.ratio}}) {
+            if (from != open[i].first || seen[to]) continue;
+            seen[to] = true;
+            open.emplace_back(to, open[i].second * ratio);
+            freedom(to).leader = {static_cast<int>(nodes_[first].link), nodes_[first].freedom, open.back().second};
+          }
+    }
+  }
+
+ private:
+  struct Node {
+    std::size_t link, freedom;
+  };
+  struct Edge {
+    std::size_t from, to;  ///< nodes
+    double ratio;          ///< of the speeds, rad or m
+  };
+  AxisFreedom& freedom(std::size_t node) { return tree_.links[nodes_[node].link].freedoms[nodes_[node].freedom]; }
+  std::size_t node(const JointAxis& axis) {
+    std::size_t n = 0;
+    while (n < nodes_.size() && !(link(n).joint == axis.joint && freedom(n).turns == axis.turns)) ++n;
+    return n;
+  }
+  const TreeLink& link(std::size_t node) const { return tree_.links[nodes_[node].link]; }
+
+  KinematicTree& tree_;
+  std::vector<Node> nodes_;
+  std::vector<Edge> edges_;
+};
+
 }  // namespace
 
 std::vector<AxisFreedom> axis_freedoms(const JointSpec& joint, bool reversed, double metres_per_unit) {
@@ -63,7 +122,6 @@ std::vector<AxisFreedom> axis_freedoms(const JointSpec& joint, bool reversed, do
       break;
     case JointType::kCylindrical:
       out = {turn(0, l.rotation), slide(0, l.translation[0])};
-      out.back().per_radian = metres_per_unit * joint.pitch;
       break;
     case JointType::kFixed:
       break;
@@ -76,7 +134,8 @@ std::vector<AxisFreedom> axis_freedoms(const JointSpec& joint, bool reversed, do
 }
 
 KinematicTree kinematic_tree(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
-                             double metres_per_unit) {
+                             const RobotOptions& options) {
+  const double metres_per_unit = options.metres_per_unit;
   const std::size_t count = assembly.components.size();
   KinematicTree tree;
   DisjointSets sets(count);
@@ -110,6 +169,7 @@ KinematicTree kinematic_tree(const Assembly& assembly, const std::vector<Detecte
       }
     }
   }
+  Leading(tree, joints, options).lead();
   return tree;
 }
 

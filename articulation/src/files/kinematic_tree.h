@@ -16,7 +16,12 @@ struct AxisFreedom {
   Vec3 axis = Vec3::UnitX();  ///< input frame
   Interval range{};           ///< rad or m
   std::string suffix{};       ///< "rx", "tz": of names
-  double per_radian = 0.0;    ///< a screw's second freedom: m per rad of the first
+  /// The freedom of the tree that it goes along with, as a screw's advance with its turn
+  struct Leader {
+    int link = -1;  ///< −1: it leads itself
+    std::size_t freedom = 0;
+    double ratio = 0.0;  ///< of its speed to the leader's, rad or m
+  } leader{};
 };
 
 /// A component in the tree.
@@ -32,11 +37,12 @@ struct TreeLink {
 struct KinematicTree {
   std::vector<TreeLink> links;  ///< parents first
   std::vector<int> roots;
-  std::vector<std::size_t> closed;  ///< joints that close a chain and are not in the tree
+  std::vector<std::size_t> closed;     ///< joints that close a chain and are not in the tree
+  std::vector<std::size_t> uncoupled;  ///< couplings that the tree has not
 };
 
 KinematicTree kinematic_tree(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
-                             double metres_per_unit);
+                             const RobotOptions& options);
 
 /// Freedoms of part b in the frame of a, or of a in that of b if `reversed`.
 std::vector<AxisFreedom> axis_freedoms(const JointSpec& joint, bool reversed, double metres_per_unit);

@@ -61,7 +61,7 @@ class Robot {
   Robot(const Assembly& parts, const std::vector<DetectedJoint>& links, const RobotOptions& o)
       : assembly(parts), joints(links), options(o), names(plain_names(parts)) {
     check();
-    tree = kinematic_tree(assembly, joints, options.metres_per_unit);
+    tree = kinematic_tree(assembly, joints, options);
     double size = 0.0;
     for (const Component& c : assembly.components) {
       size = std::max(size, c.diagonal * options.metres_per_unit);
@@ -81,6 +81,10 @@ class Robot {
   std::string joint_name(const TreeLink& link) const { return name(parent(link)) + "__" + name(link); }
   std::string joint_name(const TreeLink& link, const AxisFreedom& f) const {
     return joint_name(link) + (link.freedoms.size() > 1 ? "_" + f.suffix : "");
+  }
+  std::string leader_name(const AxisFreedom& f) const {
+    const TreeLink& leader = tree.links[static_cast<std::size_t>(f.leader.link)];
+    return joint_name(leader, leader.freedoms[f.leader.freedom]);
   }
   std::string pair_text(std::size_t joint) const {
     return names[static_cast<std::size_t>(joints[joint].a)] + " and " +
@@ -129,6 +133,15 @@ class Robot {
         throw InvalidArgument("robot file: a joint of components " + std::to_string(j.a) + " and " +
                               std::to_string(j.b) + ", expected two of " + std::to_string(count));
       j.joint.validate();
+    }
+    for (const JointCoupling& c : options.couplings) {
+      if (c.even && (c.ratio == 0.0 || !std::isfinite(c.ratio)))
+        throw InvalidArgument("robot file: a coupling with the ratio " + exact(c.ratio) + ", expected a number but 0");
+      for (const JointAxis& axis : {c.first, c.second})
+        if (axis.joint >= joints.size() || !has_axis(joints[axis.joint].joint, axis.turns))
+          throw InvalidArgument("robot file: a coupling of joint " + std::to_string(axis.joint) + " of " +
+                                std::to_string(joints.size()) + ", expected one that " +
+                                (axis.turns ? "turns" : "slides") + " by itself");
     }
   }
 
@@ -202,9 +215,9 @@ std::string urdf_freedom(const Robot& robot, const TreeLink& link, const AxisFre
   const bool continuous = f.turns && f.range.open();
   std::string more = "    <axis" + attribute("xyz", exact(f.axis)) + "/>\n";
   if (!continuous) more += urdf_limit(robot.closed_range(f.range));
-  if (f.per_radian != 0.0)
-    more += "    <mimic" + attribute("joint", robot.joint_name(link, link.freedoms.front())) +
-            attribute("multiplier", exact(f.per_radian)) + "/>\n";
+  if (f.leader.link >= 0)
+    more += "    <mimic" + attribute("joint", robot.leader_name(f)) + attribute("multiplier", exact(f.leader.ratio)) +
+            "/>\n";
   return urdf_joint(robot.joint_name(link, f),
                     continuous ? "continuous"
                     : f.turns  ? "revolute"
@@ -314,15 +327,21 @@ std::string mjcf_equalities(Robot& robot) {
   std::string text;
   for (const TreeLink& link : robot.tree.links)
     for (const AxisFreedom& f : link.freedoms)
-      if (f.per_radian != 0.0)
+      if (f.leader.link >= 0)
         text += "    <joint" + attribute("joint1", robot.joint_name(link, f)) +
-                attribute("joint2", robot.joint_name(link, link.freedoms.front())) +
-                attribute("polycoef", "0 " + exact(f.per_radian) + " 0 0 0") + "/>\n";
+                attribute("joint2", robot.leader_name(f)) +
+                attribute("polycoef", "0 " + exact(f.leader.ratio) + " 0 0 0") + "/>\n";
   for (const std::size_t j : robot.tree.closed) text += mjcf_closure(robot, j);
   return text.empty() ? text : "  <equality>\n" + text + "  </equality>\n";
 }
 
-void warn_of_cones(Robot& robot) {
+void warn_of_rest(Robot& robot) {
+  for (const std::size_t c : robot.tree.uncoupled) {
+    const JointCoupling& coupling = robot.options.couplings[c];
+    robot.warnings.push_back(
+        "The coupling of " + robot.pair_text(coupling.first.joint) + " with " + robot.pair_text(coupling.second.joint) +
+        " is left out: " + (coupling.even ? "one of the joints closes a chain." : "its ratio changes on the way."));
+  }
   for (std::size_t j = 0; j < robot.joints.size(); ++j)
     if (const double cone = robot.joints[j].joint.limits.cone; std::isfinite(cone))
       robot.warnings.push_back("The ball joint of " + robot.pair_text(j) + " has a cone of " +
@@ -357,7 +376,7 @@ RobotFile urdf_file(const Assembly& assembly, const std::vector<DetectedJoint>& 
     text += "  <!-- closed chain: " + what + " is not part of the tree -->\n";
     robot.warnings.push_back("URDF is a tree: " + what + " closes a chain and is left out.");
   }
-  warn_of_cones(robot);
+  warn_of_rest(robot);
   return {text + "</robot>\n", robot.meshes(), robot.warnings};
 }
 
@@ -373,7 +392,7 @@ RobotFile mjcf_file(const Assembly& assembly, const std::vector<DetectedJoint>& 
   text += "  </asset>\n  <worldbody>\n";
   for (const int root : robot.tree.roots) text += mjcf_body(robot, robot.tree.links[static_cast<std::size_t>(root)], 2);
   text += "  </worldbody>\n" + mjcf_equalities(robot);
-  warn_of_cones(robot);
+  warn_of_rest(robot);
   return {text + "</mujoco>\n", robot.meshes(), robot.warnings};
 }
 

@@ -45,6 +45,7 @@ class Engagement {
     if (own.overlapping || !own.reachable.bounded()) return {};
     out_.engaged = true;
     start_ = middle(*play);
+    out_.as_read = slope_within(0.5 * std::min(own.reachable.high, -own.reachable.low));
     out_.reachable.high = march(1.0, own.reachable.high, first_.limits.high);
     out_.reachable.low = -march(-1.0, -own.reachable.low, -first_.limits.low);
     return out_;
@@ -62,6 +63,12 @@ class Engagement {
       m = free_motion(moving.bodies, standing.bodies, second_.path, options_, 0.0);
     if (m.overlapping || !(m.reachable.low < 0.0 && m.reachable.high > 0.0)) return {};
     return Interval{at + m.reachable.low, at + m.reachable.high};
+  }
+
+  /// Of the second's middle while the first goes from −q to q. @param q within its play: the second is free there
+  double slope_within(double q) const {
+    const std::optional<Interval> low = second_at(-q, start_), high = second_at(q, start_);
+    return low && high && q > 0.0 ? (middle(*high) - middle(*low)) / (2.0 * q) : 0.0;
   }
 
   /// The longest step of the first that turns neither part by more than a part of a turn.

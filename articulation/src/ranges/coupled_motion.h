@@ -28,6 +28,7 @@ struct CoupledMotion {
   /// Of the second's t to the first's: all at which both may run evenly, from the middle of their play, without contact
   /// over the reachable interval. low > high: at none
   Interval ratio;
+  double as_read = 0.0;  ///< that of their speeds where they start, within the play
 };
 
 /// Follows the free interval of the second part while the first one goes on, step by step, up to a full turn. Steps are

@@ -261,8 +261,12 @@ std::string range_sentence(const Assembly& assembly, const FreedomRange& range) 
   return text + ".";
 }
 
-/// The simplest fraction of an interval of positive numbers: the first that the Stern-Brocot tree has within it.
+/// The simplest fraction of an interval without 0: the first that the Stern-Brocot tree has within it.
 std::pair<int, int> simplest_fraction(const Interval& within) {
+  if (within.high < 0.0) {
+    const auto [over, under] = simplest_fraction({-within.high, -within.low});
+    return {-over, under};
+  }
   std::array<int, 2> low{0, 1}, high{1, 0};
   for (;;) {
     const std::array<int, 2> middle{low[0] + high[0], low[1] + high[1]};
@@ -272,24 +276,46 @@ std::pair<int, int> simplest_fraction(const Interval& within) {
   }
 }
 
-/// @param angles both freedoms are rotations
-std::string coupling_sentence(const Assembly& assembly, const DetectedJoint& other, const FreedomRange& freedom,
-                              const CoupledFreedom& c, bool angles) {
+std::string coupling_sentence(const Assembly& assembly, const DetectedJoint& other, const std::string& freedom,
+                              const JointCoupling& c) {
   const auto name = [&](Index i) { return "\"" + assembly.components[static_cast<std::size_t>(i)].name + "\""; };
-  std::string text = freedom.freedom + ": coupled with joint " + std::to_string(c.joint) + ", " + name(other.a) +
-                     " - " + name(other.b) + ", ";
-  const Interval& r = c.ratio;
-  if (!(r.low <= r.high) || r.low * r.high <= 0.0) return text + "whose speed changes on the way.";
-  text += "which goes " + number_text(0.5 * (r.low + r.high), 4) + " times as far";
-  if (angles) {
-    const bool back = r.high < 0.0;
-    const auto [over, under] = simplest_fraction(back ? Interval{-r.high, -r.low} : r);
-    text += std::string(" (") + (back ? "-" : "") + std::to_string(over) + "/" + std::to_string(under) + ")";
+  return freedom + ": coupled with joint " + std::to_string(c.second.joint) + ", " + name(other.a) + " - " +
+         name(other.b) +
+         (c.even ? ", which goes " + ratio_text(c) + " times as far." : ", whose speed changes on the way.");
+}
+
+/// A freedom with one that goes along.
+JointCoupling coupling_of(const std::vector<RangeOfMotion>& ranges, std::size_t joint, std::size_t freedom,
+                          const CoupledFreedom& other) {
+  const FreedomRange &first = ranges[joint].freedoms[freedom], &second = ranges[other.joint].freedoms[other.freedom];
+  Interval ratio = other.ratio;
+  for (const CoupledFreedom& back : second.coupled) {
+    if (back.joint != joint || back.freedom != freedom || back.ratio.low * back.ratio.high <= 0.0) continue;
+    ratio = {std::max(ratio.low, 1.0 / back.ratio.high), std::min(ratio.high, 1.0 / back.ratio.low)};
   }
-  return text + ".";
+  JointCoupling out{{joint, is_angle(first.freedom)}, {other.joint, is_angle(second.freedom)}};
+  out.even = ratio.low <= ratio.high && ratio.low * ratio.high > 0.0 && ratio.bounded();
+  if (!out.even) {
+    out.ratio = other.as_read;
+  } else if (out.first.turns && out.second.turns) {
+    const auto [over, under] = simplest_fraction(ratio);
+    out.ratio = static_cast<double>(over) / under;
+  } else {
+    out.ratio = 0.5 * (ratio.low + ratio.high);
+  }
+  return out;
 }
 
 }  // namespace
+
+std::string ratio_text(const JointCoupling& c) {
+  std::string text = number_text(c.ratio, 4);
+  if (!c.first.turns || !c.second.turns || c.ratio == 0.0) return text;
+  constexpr double kRoundOff = 1e-12;
+  const auto [low, high] = std::minmax({c.ratio * (1.0 - kRoundOff), c.ratio * (1.0 + kRoundOff)});
+  const auto [over, under] = simplest_fraction({low, high});
+  return text + " (" + std::to_string(over) + "/" + std::to_string(under) + ")";
+}
 
 void RangeOptions::validate() const {
   motion.validate();
@@ -360,7 +386,7 @@ class Couplings {
             part(first, second, own.reachable), part(second, first, without(second, partners_of(second)).reachable),
             task_.options.motion);
         if (!m.engaged) continue;
-        freedom.coupled.push_back({second.joint, second.freedom, m.ratio});
+        freedom.coupled.push_back({second.joint, second.freedom, m.ratio, m.as_read});
         reachable = {std::max(reachable.low, m.reachable.low), std::min(reachable.high, m.reachable.high)};
       }
       if (freedom.coupled.empty()) continue;
@@ -456,15 +482,15 @@ FreeMotion Couplings::without(const Freedom& f, const std::vector<Freedom>& part
 // Telling -------------------------------------------------------------------------------------------------------------
 
 /// Adds the reasons, and takes out freedoms that are too narrow.
-void tell(const Task& task, std::size_t joint, RangeOfMotion& range) {
+void tell(const Task& task, std::size_t joint, std::vector<RangeOfMotion>& ranges) {
+  RangeOfMotion& range = ranges[joint];
   if (range.joint.type == JointType::kFixed) return;
-  for (const FreedomRange& freedom : range.freedoms) {
+  for (std::size_t f = 0; f < range.freedoms.size(); ++f) {
+    const FreedomRange& freedom = range.freedoms[f];
     range.reasons.push_back(range_sentence(task.assembly, freedom));
-    for (const CoupledFreedom& c : freedom.coupled) {
-      JointSpec other = task.joints[c.joint].joint;
-      const bool angles = is_angle(freedom.freedom) && is_angle(paths_of(other)[c.freedom].freedom);
-      range.reasons.push_back(coupling_sentence(task.assembly, task.joints[c.joint], freedom, c, angles));
-    }
+    for (const CoupledFreedom& c : freedom.coupled)
+      range.reasons.push_back(
+          coupling_sentence(task.assembly, task.joints[c.joint], freedom.freedom, coupling_of(ranges, joint, f, c)));
   }
   if (range.joint.type == JointType::kBall)
     range.reasons.push_back("swing of x: " +
@@ -509,8 +535,22 @@ std::vector<RangeOfMotion> ranges_of_motion(const Assembly& assembly, const std:
   std::vector<RangeOfMotion> out = alone;
   const Couplings couplings(task, alone);
   jobs.parallel_for(joints.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t j = begin; j < end; ++j) couplings.couple(j, out[j]), tell(task, j, out[j]);
+    for (std::size_t j = begin; j < end; ++j) couplings.couple(j, out[j]);
   });
+  for (std::size_t j = 0; j < joints.size(); ++j) tell(task, j, out);
+  return out;
+}
+
+std::vector<JointCoupling> joint_couplings(const std::vector<RangeOfMotion>& ranges) {
+  std::vector<JointCoupling> out;
+  for (std::size_t j = 0; j < ranges.size(); ++j)
+    for (std::size_t f = 0; f < ranges[j].freedoms.size(); ++f)
+      for (const CoupledFreedom& c : ranges[j].freedoms[f].coupled) {
+        const JointCoupling coupling = coupling_of(ranges, j, f, c);
+        const bool kept =
+            has_axis(ranges[j].joint, coupling.first.turns) && has_axis(ranges[c.joint].joint, coupling.second.turns);
+        if (j < c.joint && kept) out.push_back(coupling);
+      }
   return out;
 }
 

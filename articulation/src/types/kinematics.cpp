@@ -1,15 +1,20 @@
 #include <Eigen/QR>
 #include <Eigen/SparseCholesky>
 #include <cmath>
+#include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "limber/articulation/detect_joints.h"
 #include "limber/core/disjoint_sets.h"
+#include "limber/core/error.h"
 #include "tuning.h"
 
 namespace limber {
 namespace {
 
+using Row = Eigen::Matrix<double, 6, 1>;
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, 6>;
 
 /// How a component's motion is written: (length · ω, velocity of the centre). A length and a centre of its own keep
@@ -19,20 +24,27 @@ struct OwnMotion {
   double length = 1.0;
 };
 
+/// axis · ω
+Row turn_row(const Vec3& axis, const OwnMotion& own) {
+  Row row;
+  row << axis / own.length, Vec3::Zero();
+  return row;
+}
+
+/// axis · (v + ω × origin), of the point at the joint's origin.
+Row shift_row(const Vec3& axis, const JointSpec& joint, const OwnMotion& own) {
+  Row row;
+  row << ((joint.frame.origin - own.centre) / own.length).cross(axis), axis;
+  return row;
+}
+
 /// The rows that a joint gives to the motion of one of its components: r_b·ξ_b = r_a·ξ_a for what the joint holds.
 /// @param row_length by which rows without a length are multiplied
 Rows held_motions(const JointSpec& joint, const OwnMotion& own, double row_length) {
   const Mat3& axes = joint.frame.axes;
-  const Vec3 origin = (joint.frame.origin - own.centre) / own.length;
-  std::vector<Eigen::Matrix<double, 6, 1>> rows;
-  const auto no_turn = [&](int axis) {
-    rows.emplace_back();
-    rows.back() << row_length / own.length * axes.col(axis), Vec3::Zero();
-  };
-  const auto no_shift = [&](int axis) {  // axis · (v + ω × origin)
-    rows.emplace_back();
-    rows.back() << origin.cross(axes.col(axis)), axes.col(axis);
-  };
+  std::vector<Row> rows;
+  const auto no_turn = [&](int axis) { rows.push_back(row_length * turn_row(axes.col(axis), own)); };
+  const auto no_shift = [&](int axis) { rows.push_back(shift_row(axes.col(axis), joint, own)); };
   const JointType type = joint.type;
   const bool ball = type == JointType::kBall, planar = type == JointType::kPlanar;
   const bool turns_about_x = ball || type == JointType::kRevolute || type == JointType::kCylindrical;
@@ -45,11 +57,17 @@ Rows held_motions(const JointSpec& joint, const OwnMotion& own, double row_lengt
   no_shift(2);
   if (joint.pitch != 0.0) {  // the advance follows the turn
     no_shift(0);
-    rows.back().head<3>() -= joint.pitch / own.length * axes.col(0);
+    rows.back() -= joint.pitch * turn_row(axes.col(0), own);
   }
   Rows out(rows.size(), 6);
   for (std::size_t i = 0; i < rows.size(); ++i) out.row(static_cast<Eigen::Index>(i)) = rows[i];
   return out;
+}
+
+/// A component's part of the speed of an axis.
+Row axis_row(const JointSpec& joint, bool turns, const OwnMotion& own) {
+  const Vec3 axis = joint.frame.axes.col(0);
+  return turns ? turn_row(axis, own) : shift_row(axis, joint, own);
 }
 
 Index freedom_count(const JointSpec& joint) {
@@ -77,9 +95,114 @@ Index rank_of(Eigen::SparseMatrix<double> A) {
   return static_cast<Index>((factor.vectorD().array() > t.frames.independent * t.frames.independent).count());
 }
 
+/// Components that joints and couplings hold together know nothing of others: each set has rows and columns of its own.
+class ConstraintRank {
+ public:
+  ConstraintRank(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
+                 std::span<const JointCoupling> couplings)
+      : joints_(joints), couplings_(couplings), sets_(assembly.components.size()), own_(assembly.components.size()) {
+    std::vector<double> joints_at(own_.size(), 0.0);
+    for (std::size_t c = 0; c < own_.size(); ++c)
+      if (assembly.components[c].diagonal > 0.0) own_[c].length = assembly.components[c].diagonal;
+    for (const DetectedJoint& j : joints) {
+      sets_.join(j.a, j.b);
+      for (const Index c : {j.a, j.b})
+        own(c).centre += (j.joint.frame.origin - own(c).centre) / ++joints_at[static_cast<std::size_t>(c)];  // a mean
+    }
+    for (const JointCoupling& c : couplings) sets_.join(joints[c.first.joint].a, joints[c.second.joint].a);
+    std::vector<Index> columns(own_.size(), 0);
+    for (std::size_t c = 0; c < own_.size(); ++c) column_.push_back(6 * columns[root(static_cast<Index>(c))]++);
+    sets_of_rows_.resize(own_.size());
+    for (std::size_t c = 0; c < own_.size(); ++c) sets_of_rows_[c].columns = 6 * columns[c];
+  }
+
+  Index rank() {
+    for (const DetectedJoint& j : joints_) add(j);
+    for (const JointCoupling& c : couplings_) add(c);
+    Index rank = 0;
+    for (const SetOfRows& set : sets_of_rows_) {
+      if (set.rows == 0) continue;
+      Eigen::SparseMatrix<double> A(set.rows, set.columns);
+      A.setFromTriplets(set.entries.begin(), set.entries.end());
+      rank += rank_of(A);
+    }
+    return rank;
+  }
+
+ private:
+  struct SetOfRows {
+    std::vector<Eigen::Triplet<double>> entries;
+    Index rows = 0, columns = 0;
+  };
+  OwnMotion& own(Index c) { return own_[static_cast<std::size_t>(c)]; }
+  std::size_t root(Index c) { return static_cast<std::size_t>(sets_.root(c)); }
+
+  /// Entries of a component in the last row of its set.
+  void put(SetOfRows& set, Index component, const Row& row) {
+    for (Index k = 0; k < 6; ++k)
+      set.entries.emplace_back(set.rows - 1, column_[static_cast<std::size_t>(component)] + k, row[k]);
+  }
+
+  void add(const DetectedJoint& j) {
+    const double row_length = std::sqrt(own(j.a).length * own(j.b).length);
+    const Rows of_a = held_motions(j.joint, own(j.a), row_length), of_b = held_motions(j.joint, own(j.b), row_length);
+    SetOfRows& set = sets_of_rows_[root(j.a)];
+    for (Eigen::Index r = 0; r < of_b.rows(); ++r) {
+      ++set.rows;
+      put(set, j.b, of_b.row(r));
+      put(set, j.a, -of_a.row(r));
+    }
+  }
+
+  Row row(const JointAxis& axis, Index component) {
+    return axis_row(joints_[axis.joint].joint, axis.turns, own(component));
+  }
+
+  /// The second axis' speed is the ratio times the first's; the row has the norm 1.
+  void add(const JointCoupling& c) {
+    SetOfRows& set = sets_of_rows_[root(joints_[c.first.joint].a)];
+    ++set.rows;
+    const std::pair<JointAxis, double> sides[] = {{c.second, 1.0}, {c.first, -c.ratio}};
+    double square = 0.0;
+    for (const auto& side : sides)
+      for (const Index part : {joints_[side.first.joint].a, joints_[side.first.joint].b})
+        square += (side.second * row(side.first, part)).squaredNorm();
+    const double scale = 1.0 / std::sqrt(square);
+    for (const auto& side : sides) {
+      const DetectedJoint& j = joints_[side.first.joint];
+      put(set, j.b, scale * side.second * row(side.first, j.b));
+      put(set, j.a, -scale * side.second * row(side.first, j.a));
+    }
+  }
+
+  const std::vector<DetectedJoint>& joints_;
+  std::span<const JointCoupling> couplings_;
+  DisjointSets sets_;
+  std::vector<OwnMotion> own_;           ///< per component
+  std::vector<Index> column_;            ///< per component, in its set
+  std::vector<SetOfRows> sets_of_rows_;  ///< at the root of each set
+};
+
+void check(const std::vector<DetectedJoint>& joints, std::span<const JointCoupling> couplings) {
+  for (const JointCoupling& c : couplings)
+    for (const JointAxis& axis : {c.first, c.second})
+      if (axis.joint >= joints.size() || !has_axis(joints[axis.joint].joint, axis.turns))
+        throw InvalidArgument("JointCoupling: joint " + std::to_string(axis.joint) + " of " +
+                              std::to_string(joints.size()) + " does not " +
+                              (axis.turns ? "turn about" : "slide along") + " x by itself");
+}
+
 }  // namespace
 
-Kinematics overall_kinematics(const Assembly& assembly, const std::vector<DetectedJoint>& joints) {
+bool has_axis(const JointSpec& joint, bool turns) {
+  const bool cylindrical = joint.type == JointType::kCylindrical;
+  if (turns) return cylindrical || joint.type == JointType::kRevolute;
+  return (cylindrical && joint.pitch == 0.0) || joint.type == JointType::kPrismatic;
+}
+
+Kinematics overall_kinematics(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
+                              std::span<const JointCoupling> couplings) {
+  check(joints, couplings);
   const auto count = static_cast<Index>(assembly.components.size());
   Kinematics out;
   DisjointSets sets(static_cast<std::size_t>(count));
@@ -91,41 +214,8 @@ Kinematics overall_kinematics(const Assembly& assembly, const std::vector<Detect
   for (Index c = 0; c < count; ++c)
     if (sets.root(c) == c) ++out.groups;
   out.loops = static_cast<Index>(joints.size()) - count + out.groups;
-  out.kutzbach = freedom_sum - 6 * out.loops;
-
-  std::vector<OwnMotion> own(static_cast<std::size_t>(count));
-  std::vector<double> joints_at(static_cast<std::size_t>(count), 0.0);
-  for (std::size_t c = 0; c < own.size(); ++c)
-    if (assembly.components[c].diagonal > 0.0) own[c].length = assembly.components[c].diagonal;
-  for (const DetectedJoint& j : joints)
-    for (const auto c : {static_cast<std::size_t>(j.a), static_cast<std::size_t>(j.b)})
-      own[c].centre += (j.joint.frame.origin - own[c].centre) / ++joints_at[c];  // running mean
-  // Groups know nothing of each other: each has rows and columns of its own.
-  std::vector<Index> place(static_cast<std::size_t>(count), -1), columns(static_cast<std::size_t>(count), 0);
-  for (Index c = 0; c < count; ++c)
-    place[static_cast<std::size_t>(c)] = columns[static_cast<std::size_t>(sets.root(c))]++;
-  std::vector<std::vector<const DetectedJoint*>> of_group(static_cast<std::size_t>(count));
-  for (const DetectedJoint& j : joints) of_group[static_cast<std::size_t>(sets.root(j.a))].push_back(&j);
-  Index rank = 0;
-  for (std::size_t g = 0; g < of_group.size(); ++g) {
-    std::vector<Eigen::Triplet<double>> entries;
-    Index row = 0;
-    for (const DetectedJoint* j : of_group[g]) {
-      const auto a = static_cast<std::size_t>(j->a), b = static_cast<std::size_t>(j->b);
-      const double row_length = std::sqrt(own[a].length * own[b].length);
-      const Rows of_a = held_motions(j->joint, own[a], row_length), of_b = held_motions(j->joint, own[b], row_length);
-      for (Index r = 0; r < static_cast<Index>(of_b.rows()); ++r, ++row)
-        for (Index k = 0; k < 6; ++k) {
-          entries.emplace_back(row, 6 * place[b] + k, of_b(r, k));
-          entries.emplace_back(row, 6 * place[a] + k, -of_a(r, k));
-        }
-    }
-    if (row == 0) continue;
-    Eigen::SparseMatrix<double> A(row, 6 * columns[g]);
-    A.setFromTriplets(entries.begin(), entries.end());
-    rank += rank_of(A);
-  }
-  out.mobility = 6 * (count - out.groups) - rank;
+  out.kutzbach = freedom_sum - 6 * out.loops - static_cast<Index>(couplings.size());
+  out.mobility = 6 * (count - out.groups) - ConstraintRank(assembly, joints, couplings).rank();
   return out;
 }
 

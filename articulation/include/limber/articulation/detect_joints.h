@@ -20,6 +20,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -69,13 +70,31 @@ struct DetectionOptions {
 std::vector<DetectedJoint> detect_joints(const Assembly& assembly, const DetectionOptions& options = {},
                                          Jobs& jobs = serial_jobs());
 
+/// The turn about x of a joint, or the slide along it.
+struct JointAxis {
+  std::size_t joint = 0;
+  bool turns = true;
+};
+
+/// Two axes that go along with each other, as those of gears that mesh. ranges_of_motion() finds them.
+struct JointCoupling {
+  JointAxis first, second;
+  double ratio = 0.0;  ///< of the second's speed to the first's, as read; lengths in the input's unit
+  bool even = true;    ///< the same ratio over the whole range
+};
+
 /// How the joints act together.
 struct Kinematics {
   Index loops = 0;     ///< independent closed chains: joints − components + groups
   Index groups = 0;    ///< sets of components connected by joints; a lone component is one
   Index mobility = 0;  ///< motions of all components less 6 per group, by the rank of the joints' constraints as read
-  Index kutzbach = 0;  ///< Σ freedoms − 6 loops: what counting alone says; may be negative
+  Index kutzbach = 0;  ///< Σ freedoms − 6 loops − couplings: what counting alone says; may be negative
 };
-Kinematics overall_kinematics(const Assembly& assembly, const std::vector<DetectedJoint>& joints);
+/// @throws InvalidArgument if a coupling names an axis that its joint has not
+Kinematics overall_kinematics(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
+                              std::span<const JointCoupling> couplings = {});
+
+/// Whether the joint turns about x, or slides along it, by a coordinate of its own; a screw turns.
+bool has_axis(const JointSpec& joint, bool turns);
 
 }  // namespace limber

@@ -15,6 +15,7 @@
 ///
 /// Gears, racks and the like stop each other within their play. Where two parts, each with a rotation, translation or
 /// screw of its own, do so, either is followed while the other goes along, and FreedomRange::coupled tells the ratio.
+/// joint_couplings() gathers them for overall_kinematics() and robot files.
 ///
 /// A freedom narrower than `min_rotation` or `min_translation` is none, and the joint becomes the type that is left:
 /// cylindrical revolute or prismatic, planar prismatic or revolute, ball revolute, any of them fixed.
@@ -59,6 +60,7 @@ struct CoupledFreedom {
   /// Of its t to this one's: all at which both run evenly without contact over the whole range. low > high: at none; it
   /// changes on the way, as with a cam
   Interval ratio;
+  double as_read = 0.0;  ///< that of the speeds at the start
 };
 
 /// One freedom of a joint, as it was tried.
@@ -83,6 +85,13 @@ RangeOfMotion range_of_motion(const Assembly& assembly, const std::vector<Detect
 /// count.
 std::vector<RangeOfMotion> ranges_of_motion(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
                                             const RangeOptions& options = {}, Jobs& jobs = serial_jobs());
+
+/// The couplings among ranges, each pair of axes once. The ratio is one at which both run evenly whichever leads: of
+/// two turns the simplest fraction, else the middle.
+std::vector<JointCoupling> joint_couplings(const std::vector<RangeOfMotion>& ranges);
+
+/// "-0.6667 (-2/3)": a ratio in digits, and the fraction that it stands for between two turns.
+std::string ratio_text(const JointCoupling& coupling);
 
 /// The joint without the freedoms that are too narrow. @param min_translation length. @param reasons gets a sentence
 /// for each freedom that goes

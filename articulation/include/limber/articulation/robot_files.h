@@ -20,6 +20,9 @@
 /// open end beside a closed one is written as a number a thousand times the model's size, for which both formats ask.
 /// If the tree runs against a joint (its parent is b), order and axes are reversed, so the coordinates stay the
 /// same.
+///
+/// Even couplings are mimics in URDF, each of the first axis of its set, and equalities of joints in MJCF. One whose
+/// joint is not in the tree, or whose ratio changes on the way, is left out with a warning.
 #pragma once
 
 #include <string>
@@ -32,10 +35,11 @@
 namespace limber {
 
 struct RobotOptions {
-  std::string name = "model";          ///< of the robot
-  std::string mesh_folder = "meshes";  ///< relative to the file; where the caller puts `meshes`
-  double density = 1000.0;             ///< kg/m³, of all parts; > 0
-  double metres_per_unit = 1.0;        ///< of the input's length unit; > 0
+  std::string name = "model";                 ///< of the robot
+  std::string mesh_folder = "meshes";         ///< relative to the file; where the caller puts `meshes`
+  double density = 1000.0;                    ///< kg/m³, of all parts; > 0
+  double metres_per_unit = 1.0;               ///< of the input's length unit; > 0
+  std::vector<JointCoupling> couplings = {};  ///< of gears and the like: joint_couplings()
 };
 
 struct RobotFile {
