@@ -9,11 +9,13 @@
 #include "limber/core/error.h"
 #include "limber/mesh/write_mesh.h"
 #include "number_text.h"
+#include "types/couplings.h"
 
 namespace limber {
 namespace {
 
 using internal::AxisFreedom;
+using internal::check_couplings;
 using internal::kinematic_tree;
 using internal::KinematicTree;
 using internal::TreeLink;
@@ -134,15 +136,10 @@ class Robot {
                               std::to_string(j.b) + ", expected two of " + std::to_string(count));
       j.joint.validate();
     }
-    for (const JointCoupling& c : options.couplings) {
+    check_couplings(joints, options.couplings);
+    for (const JointCoupling& c : options.couplings)
       if (c.even && (c.ratio == 0.0 || !std::isfinite(c.ratio)))
         throw InvalidArgument("robot file: a coupling with the ratio " + exact(c.ratio) + ", expected a number but 0");
-      for (const JointAxis& axis : {c.first, c.second})
-        if (axis.joint >= joints.size() || !has_axis(joints[axis.joint].joint, axis.turns))
-          throw InvalidArgument("robot file: a coupling of joint " + std::to_string(axis.joint) + " of " +
-                                std::to_string(joints.size()) + ", expected one that " +
-                                (axis.turns ? "turns" : "slides") + " by itself");
-    }
   }
 
   Mass mass_of(const Component& c) {

@@ -10,6 +10,7 @@
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 #include "tuning.h"
+#include "types/couplings.h"
 
 namespace limber {
 namespace {
@@ -70,10 +71,7 @@ Row axis_row(const JointSpec& joint, bool turns, const OwnMotion& own) {
   return turns ? turn_row(axis, own) : shift_row(axis, joint, own);
 }
 
-Index freedom_count(const JointSpec& joint) {
-  const JointFreedoms free = freedoms(joint.type);
-  return free.rotations + free.translations - (joint.pitch != 0.0 ? 1 : 0);
-}
+Index freedom_count(const JointSpec& joint) { return freedoms(joint.type).count() - (joint.pitch != 0.0 ? 1 : 0); }
 
 /// The rank, columns of one norm. Few columns take a pivoted QR; many take the pivots of AᵀA = L D Lᵀ in an order of
 /// little fill-in: without pivoting these are the squares of QR's, and a little on the diagonal keeps dependent columns
@@ -183,15 +181,6 @@ class ConstraintRank {
   std::vector<SetOfRows> sets_of_rows_;  ///< at the root of each set
 };
 
-void check(const std::vector<DetectedJoint>& joints, std::span<const JointCoupling> couplings) {
-  for (const JointCoupling& c : couplings)
-    for (const JointAxis& axis : {c.first, c.second})
-      if (axis.joint >= joints.size() || !has_axis(joints[axis.joint].joint, axis.turns))
-        throw InvalidArgument("JointCoupling: joint " + std::to_string(axis.joint) + " of " +
-                              std::to_string(joints.size()) + " does not " +
-                              (axis.turns ? "turn about" : "slide along") + " x by itself");
-}
-
 }  // namespace
 
 bool has_axis(const JointSpec& joint, bool turns) {
@@ -200,9 +189,22 @@ bool has_axis(const JointSpec& joint, bool turns) {
   return (cylindrical && joint.pitch == 0.0) || joint.type == JointType::kPrismatic;
 }
 
+namespace internal {
+
+void check_couplings(const std::vector<DetectedJoint>& joints, std::span<const JointCoupling> couplings) {
+  for (const JointCoupling& c : couplings)
+    for (const JointAxis& axis : {c.first, c.second})
+      if (axis.joint >= joints.size() || !has_axis(joints[axis.joint].joint, axis.turns))
+        throw InvalidArgument("JointCoupling: joint " + std::to_string(axis.joint) + " of " +
+                              std::to_string(joints.size()) + " does not " +
+                              (axis.turns ? "turn about" : "slide along") + " x by itself");
+}
+
+}  // namespace internal
+
 Kinematics overall_kinematics(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
                               std::span<const JointCoupling> couplings) {
-  check(joints, couplings);
+  internal::check_couplings(joints, couplings);
   const auto count = static_cast<Index>(assembly.components.size());
   Kinematics out;
   DisjointSets sets(static_cast<std::size_t>(count));
