@@ -82,7 +82,7 @@ void JointConstraint::plan_locked_rows() {
   const int rotations = freedoms(spec_.type).rotations;
   for (int axis = 0; axis < 3; ++axis) {
     bool is_free = false;
-    for (int i = 0; i < coordinates(); ++i) is_free = is_free || (!is_angle(i) && axis_of(i) == axis);
+    for (int i = 0; i < coordinates(); ++i) is_free = is_free || (!is_rotation(spec_.type, i) && axis_of(i) == axis);
     if (!is_free) plan_.push_back({.measure = Measure::kTranslation, .axis = axis});
   }
   if (spec_.type == JointType::kCylindrical && spec_.pitch != 0.0) plan_.push_back({.measure = Measure::kScrew});
@@ -95,8 +95,8 @@ void JointConstraint::plan_limits() {
   const JointLimits& limits = spec_.limits;
   for (int i = 0; i < coordinates(); ++i) {
     const Interval& interval = spec_.type == JointType::kBall ? limits.euler[static_cast<std::size_t>(i)]
-                               : is_angle(i)                  ? limits.rotation
-                                             : limits.translation[static_cast<std::size_t>(axis_of(i))];
+                               : is_rotation(spec_.type, i)   ? limits.rotation
+                                                            : limits.translation[static_cast<std::size_t>(axis_of(i))];
     if (std::isfinite(interval.low)) plan_.push_back(row_of(i, Law::kLimit, 1.0, interval.low));
     if (std::isfinite(interval.high)) plan_.push_back(row_of(i, Law::kLimit, -1.0, interval.high));
   }
@@ -118,7 +118,7 @@ void JointConstraint::plan_actuation() {
 }
 
 JointConstraint::RowPlan JointConstraint::row_of(int coordinate, Law law, double sign, double zero) const {
-  return {.measure = is_angle(coordinate) ? Measure::kAngle : Measure::kTranslation,
+  return {.measure = is_rotation(spec_.type, coordinate) ? Measure::kAngle : Measure::kTranslation,
           .law = law,
           .axis = axis_of(coordinate),
           .coordinate = coordinate,
@@ -127,11 +127,6 @@ JointConstraint::RowPlan JointConstraint::row_of(int coordinate, Law law, double
 }
 
 // Coordinates ---------------------------------------------------------------------------------------------------------
-
-/// Rotations come first, but for planar joints.
-bool JointConstraint::is_angle(int coordinate) const {
-  return spec_.type == JointType::kPlanar ? coordinate == 2 : coordinate < freedoms(spec_.type).rotations;
-}
 
 int JointConstraint::axis_of(int coordinate) const { return spec_.type == JointType::kPlanar ? coordinate : 0; }
 
@@ -156,7 +151,7 @@ double JointConstraint::raw_angle(const Placement& at, int i) const {
 
 /// Angles with the number of full turns that is nearest to the last step's.
 double JointConstraint::unwrapped(const Placement& at, int i) const {
-  if (!is_angle(i)) return at.d[axis_of(i)];
+  if (!is_rotation(spec_.type, i)) return at.d[axis_of(i)];
   const double raw = raw_angle(at, i);
   constexpr double kTurn = 2.0 * std::numbers::pi;
   return raw + kTurn * std::round((last_[static_cast<std::size_t>(i)] - raw) / kTurn);

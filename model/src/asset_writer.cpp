@@ -255,8 +255,7 @@ void check(const Asset& asset) {
     if (!(joint.patch_radius >= 0.0 && std::isfinite(joint.patch_radius)))
       throw InvalidArgument("asset_bytes: a joint's patch_radius is " + std::to_string(joint.patch_radius) +
                             " m, expected a finite number of at least 0");
-    const JointFreedoms free = freedoms(joint.spec.type);
-    if (joint.coordinates.size() > static_cast<std::size_t>(free.rotations + free.translations))
+    if (joint.coordinates.size() > static_cast<std::size_t>(freedoms(joint.spec.type).count()))
       throw InvalidArgument("asset_bytes: a " + std::string(to_string(joint.spec.type)) + " joint has " +
                             std::to_string(joint.coordinates.size()) + " coordinates, more than its type");
     for (const JointActuation& a : joint.coordinates) a.validate();

@@ -47,6 +47,10 @@ JointFreedoms freedoms(JointType type) {
   return {0, 0};
 }
 
+bool is_rotation(JointType type, int coordinate) {
+  return type == JointType::kPlanar ? coordinate == 2 : coordinate < freedoms(type).rotations;
+}
+
 void JointSpec::validate() const {
   constexpr double kTolerance = 1e-6;
   if (!frame.origin.allFinite()) throw InvalidArgument("JointSpec: the frame's origin is not finite");

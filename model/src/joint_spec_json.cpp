@@ -208,8 +208,7 @@ std::vector<JointActuation> read_joint_coordinates(const JsonObject& o, JointTyp
   if (o.has("coordinates"))
     o.for_each("coordinates",
                [&](const nlohmann::json& v, const std::string& w) { all.push_back(read_joint_actuation(v, w)); });
-  const JointFreedoms free = freedoms(type);
-  const std::size_t most = static_cast<std::size_t>(free.rotations) + static_cast<std::size_t>(free.translations);
+  const auto most = static_cast<std::size_t>(freedoms(type).count());
   if (all.size() > most)
     refuse(o.where("coordinates"), "an array of " + std::to_string(all.size()) + " items",
            "at most " + std::to_string(most) + ", which a " + std::string(to_string(type)) + " joint has");

@@ -5,7 +5,6 @@
 #include <set>
 #include <utility>
 
-#include "joint_coordinates.h"
 #include "joint_loads.h"
 
 namespace limber::internal {
@@ -58,7 +57,7 @@ Json held_still(const Asset& asset) {
   std::set<std::pair<Index, Index>> told;  // a scene finds a joint by its two bodies
   for (std::size_t j = 0; j < asset.joints.size(); ++j) {
     const AssetJoint& joint = asset.joints[j];
-    const int count = coordinates(joint.spec.type);
+    const int count = freedoms(joint.spec.type).count();
     if (!joint.coordinates.empty() || !loads[j].held || count == 0) continue;
     if (!told.emplace(joint.a, joint.b).second) continue;
     const auto name = [&](Index i) { return asset.bodies[static_cast<std::size_t>(i)]->name(); };
@@ -66,7 +65,7 @@ Json held_still(const Asset& asset) {
     if (joint.a != AssetJoint::kWorld) drive["a"] = name(joint.a);
     for (int i = 0; i < count; ++i)
       drive["coordinates"].push_back(
-          {{"friction", kGravity * (turns(joint.spec.type, i) ? loads[j].moment : loads[j].mass)}});
+          {{"friction", kGravity * (is_rotation(joint.spec.type, i) ? loads[j].moment : loads[j].mass)}});
     drives.push_back(std::move(drive));
   }
   return drives;

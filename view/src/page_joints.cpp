@@ -3,7 +3,6 @@
 #include <cmath>
 #include <string>
 
-#include "joint_coordinates.h"
 #include "limber/core/error.h"
 
 namespace limber::internal {
@@ -70,7 +69,7 @@ void PageJoints::frames(const World& world, std::vector<double>& out) const {
 JointActuation PageJoints::actuation(const Joint& joint, int coordinate, const CoordinateWish& wish) const {
   const auto i = static_cast<std::size_t>(coordinate);
   JointActuation acts = i < joint.own.size() ? joint.own[i] : JointActuation{};
-  const bool angle = turns(joint.type, coordinate);
+  const bool angle = is_rotation(joint.type, coordinate);
   const double inertia = angle ? joint.load.inertia : joint.load.mass;
   if (std::isfinite(wish.place)) {
     acts.drive_target = wish.place;
@@ -89,7 +88,7 @@ void PageJoints::wish(World& world, JointWishes& wishes, int joint, int coordina
   if (joint < 0 || static_cast<std::size_t>(joint) >= joints_.size())
     throw InvalidArgument("PageWorld: there is no joint " + std::to_string(joint));
   const Joint& driven = joints_[static_cast<std::size_t>(joint)];
-  if (coordinate < 0 || coordinate >= coordinates(driven.type))
+  if (coordinate < 0 || coordinate >= freedoms(driven.type).count())
     throw InvalidArgument("PageWorld: joint " + std::to_string(joint) + " has no coordinate " +
                           std::to_string(coordinate));
   wishes.resize(joints_.size());

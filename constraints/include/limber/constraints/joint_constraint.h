@@ -33,7 +33,7 @@ class JointConstraint final : public Constraint {
   /// @throws InvalidArgument if the spec is not valid
   JointConstraint(MaterialFrame a, MaterialFrame b, const JointSpec& spec);
 
-  int coordinates() const { return freedoms(spec_.type).rotations + freedoms(spec_.type).translations; }
+  int coordinates() const { return freedoms(spec_.type).count(); }
   void set_actuation(int coordinate, const JointActuation& actuation);
   const JointActuation& actuation(int coordinate) const { return actuation_[static_cast<std::size_t>(coordinate)]; }
 
@@ -120,7 +120,6 @@ class JointConstraint final : public Constraint {
   Vec3 direction_change(const Placement& at, const RowPlan& row, const Mat3& dR_a, const Mat3& dR_b) const;
   Direction mean_direction(const Placement& start, const Placement& end, const Placement& at, const RowPlan& row,
                            const Vec3& turn) const;
-  bool is_angle(int coordinate) const;
   int axis_of(int coordinate) const;
   int turning_axis() const { return spec_.type == JointType::kPlanar ? 2 : 0; }  // of what turns about one alone
   static bool is_distance(const RowPlan& row) {

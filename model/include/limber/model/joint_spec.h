@@ -39,8 +39,11 @@ std::optional<JointType> joint_type_of(std::string_view text);
 /// Rotational and translational freedoms a type leaves.
 struct JointFreedoms {
   int rotations = 0, translations = 0;
+  int count() const { return rotations + translations; }
 };
 JointFreedoms freedoms(JointType type);
+/// Whether a coordinate, 0 to freedoms(type).count() − 1, is an angle: rotations come first, but for planar joints.
+bool is_rotation(JointType type, int coordinate);
 
 /// A closed interval; an end that is infinite is open.
 struct Interval {
