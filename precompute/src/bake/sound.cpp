@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bake/modal_blocks.h"
+#include "eigen/hertz.h"
 #include "limber/core/error.h"
 #include "limber/precompute/modal_analysis.h"
 
@@ -68,8 +69,6 @@ double contact_modulus_of(const TetMesh& mesh, std::span<const Material> materia
   return sum / volume;
 }
 
-double square_of_hz(double hz) { return 4.0 * pi * pi * hz * hz; }
-
 void fill_report_of_sound(const SoundModes& sound, SoundReport& report) {
   report.modes = sound.modes();
   report.bytes = sizeof(float) * sound.shapes.size();
@@ -102,7 +101,7 @@ std::shared_ptr<const SoundModes> bake_sound(const BodyInput& in, std::span<cons
   const TetMesh& mesh = in.part.mesh;
   ModalAnalysisOptions wanted = options.analysis;
   wanted.modes = options.sound.modes;
-  wanted.below = square_of_hz(options.sound.highest_hz);
+  wanted.below = eigenvalue_of_hz(options.sound.highest_hz);
   Warnings known;  // told of the modes that move it
   const ModalAnalysis a = analyse_modes(mesh, materials, in.fixed, wanted, known, jobs);
 
@@ -113,7 +112,7 @@ std::shared_ptr<const SoundModes> bake_sound(const BodyInput& in, std::span<cons
   for (Index m = a.freedom.mechanisms; m < static_cast<Index>(a.eigenvalues.size()); ++m) {
     const double lambda = a.eigenvalues[static_cast<std::size_t>(m)];
     if (!(lambda < wanted.below)) break;  // completes a cluster
-    if (lambda < square_of_hz(options.sound.lowest_hz)) {
+    if (lambda < eigenvalue_of_hz(options.sound.lowest_hz)) {
       ++inaudible;
       continue;
     }

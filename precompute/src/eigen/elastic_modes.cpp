@@ -184,13 +184,13 @@ EigenPairs modes_between(const ScaledProblem& problem, SpectralInverse& inverse,
   if (count == 0) return {Eigen::VectorXd(0), Eigen::MatrixXd(problem.size(), 0), Eigen::MatrixXd(problem.size(), 0)};
   EigenPairs pairs = refined(problem, inverse, first_guess(problem, inverse, count, options));
   for (int search = 0;; ++search) {
-    const Eigen::Index found = only_between(pairs, low, high).count();
-    if (found == count) return only_between(pairs, low, high);
-    if (found > count || search == kSearches)
-      throw ComputationError("the certificate of completeness fails: " + std::to_string(found) +
+    EigenPairs found = only_between(pairs, low, high);
+    if (found.count() == count) return found;
+    if (found.count() > count || search == kSearches)
+      throw ComputationError("the certificate of completeness fails: " + std::to_string(found.count()) +
                              " eigenvalues were found between two bounds that have " + std::to_string(count) +
                              " between them");
-    pairs = with_others(problem, inverse, pairs, count - found, search);
+    pairs = with_others(problem, inverse, pairs, count - found.count(), search);
   }
 }
 

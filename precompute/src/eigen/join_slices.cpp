@@ -23,11 +23,13 @@ void update(Sha256& hash, const SparseMatrix& A) {
   update(hash, A.value);
 }
 
-std::string band_text(double low, double high) {
+std::string number_text(double x) {
   std::ostringstream text;
-  text << low << " to " << high << " Hz";
+  text << x;
   return text.str();
 }
+
+std::string band_text(double low, double high) { return number_text(low) + " to " + number_text(high) + " Hz"; }
 
 [[noreturn]] void fail(const std::string& what) { throw ComputationError("slices: " + what); }
 
@@ -54,15 +56,15 @@ void check_chain(const std::vector<const SpectrumSlice*>& slices) {
     if (slice->band.low > end) fail(band_text(end, slice->band.low) + " is missing");
     if (slice->band.low < end) fail(band_text(slice->band.low, std::min(end, slice->band.high)) + " is in two of them");
     if (slice->below_low != below)
-      fail("at " + std::to_string(end) + " Hz one counts " + std::to_string(below) +
-           " eigenvalues below it, the next " + std::to_string(slice->below_low));
+      fail("at " + number_text(end) + " Hz one counts " + std::to_string(below) + " eigenvalues below it, the next " +
+           std::to_string(slice->below_low));
     end = slice->band.high;
     below = slice->below_high;
   }
   const int of = slices.front()->of, here = static_cast<int>(slices.size());
   if (here != of)
-    fail(std::to_string(here) + " of " + std::to_string(of) + " are here, from 0 to " + std::to_string(end) +
-         " Hz: what lies above is missing");
+    fail(std::to_string(here) + " of " + std::to_string(of) + " are here, " + band_text(0.0, end) +
+         ": what lies above is missing");
 }
 
 /// W (WᵀMW)^−½.

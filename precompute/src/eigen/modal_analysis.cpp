@@ -241,14 +241,15 @@ ModalAnalysis analyse_modes(const TetMesh& mesh, std::span<const Material> mater
     return analysis;
   }
 
-  const std::vector<Index> order = order_nodes(body.problem.K);
+  const bool sliced = !options.slices.empty(), factors = !sliced || options.keep_compliance,
+             counts = std::isfinite(options.below);
+  const std::vector<Index> order = factors || counts ? order_nodes(body.problem.K) : std::vector<Index>{};
   watch.lap(analysis.seconds.order);
-  const bool sliced = !options.slices.empty();
-  ElasticInverse* inverse = !sliced || options.keep_compliance ? &factored->factor(order) : nullptr;
+  ElasticInverse* inverse = factors ? &factored->factor(order) : nullptr;
   watch.lap(analysis.seconds.factor);
 
   ModalAnalysisOptions wanted = options;
-  if (std::isfinite(options.below)) {
+  if (counts) {
     EigenvalueCounter counter(body.problem.K, body.problem.node_mass, order);
     analysis.elastic_below = counter.below(options.below / body.eigenvalue_unit()) - analysis.freedom.zero_modes();
     wanted.modes = std::min(options.modes, analysis.elastic_below);

@@ -1,25 +1,17 @@
 #include "limber/precompute/spectrum_slice.h"
 
 #include <cmath>
-#include <numbers>
 #include <sstream>
 
 #include "eigen/blas_threads.h"
 #include "eigen/eigen_body.h"
 #include "eigen/elastic_modes.h"
+#include "eigen/hertz.h"
 #include "eigen/join_slices.h"
 #include "limber/core/error.h"
 #include "limber/precompute/modal_analysis.h"
 
 namespace limber {
-namespace {
-
-double eigenvalue_of(double hz) {
-  const double omega = 2.0 * std::numbers::pi * hz;
-  return omega * omega;
-}
-
-}  // namespace
 
 void FrequencyBand::validate() const {
   if (low >= 0.0 && low < high && std::isfinite(high)) return;
@@ -42,8 +34,8 @@ SpectrumSlice analyse_slice(const TetMesh& mesh, std::span<const Material> mater
   const internal::ScaledProblem& problem = body.problem;
   const std::vector<Index> order = internal::order_nodes(problem.K);
   EigenvalueCounter counter(problem.K, problem.node_mass, order);
-  const double low = eigenvalue_of(band.low) / body.eigenvalue_unit(),
-               high = eigenvalue_of(band.high) / body.eigenvalue_unit();
+  const double low = internal::eigenvalue_of_hz(band.low) / body.eigenvalue_unit(),
+               high = internal::eigenvalue_of_hz(band.high) / body.eigenvalue_unit();
   slice.below_low = low > 0.0 ? counter.below(low) : static_cast<int>(problem.N.cols());
   slice.below_high = counter.below(high);
 
