@@ -134,7 +134,7 @@ class PageWorld {
   const SoundingBody& sounding(int model);
   /// Pa at one metre that no poke at 1 m/s exceeds, however a body of the model is turned.
   double loudness(int model, double contact_time);
-  /// Notes blows from now on, or no longer.
+  /// Whether blows are noted from now on.
   void listen(bool on);
   static constexpr std::size_t kBlowNumbers = 15;
   /// Blows on bodies that have a sound since the last call: body, vertices and weights (3 each), impulse on it (3, body
