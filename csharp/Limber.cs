@@ -222,6 +222,13 @@ public sealed class World : NativeObject {
     LimberException.Check(Native.limber_world_add_joint(Pointer, a, b, ref options, out joint));
     return joint;
   }
+  /// Bodies and joints of an asset, per number; without a placement where its input has them. Joints that are left out are zeros.
+  public void AddMachine(Asset asset, out BodyId[] bodies, out JointId[] joints, MachinePlacement? placement = null) {
+    var start = placement ?? Native.limber_default_machine_placement();
+    bodies = new BodyId[(int)Native.limber_asset_body_count(asset.Pointer)];
+    joints = new JointId[(int)Native.limber_asset_joint_count(asset.Pointer)];
+    LimberException.Check(Native.limber_world_add_machine(Pointer, asset.Pointer, ref start, bodies, joints));
+  }
   public void Actuate(JointId joint, int coordinate, Actuation actuation) {
     LimberException.Check(Native.limber_world_set_joint_actuation(Pointer, joint, coordinate, ref actuation));
   }

@@ -262,6 +262,30 @@ public struct IntervalArray3 {
   }
 }
 
+/// 3 in a row.
+[StructLayout(LayoutKind.Sequential)]
+public struct ActuationArray3 {
+  Actuation e0, e1, e2;
+  public Actuation this[int i] {
+    get {
+      switch (i) {
+        case 0: return e0;
+        case 1: return e1;
+        case 2: return e2;
+        default: throw new IndexOutOfRangeException();
+      }
+    }
+    set {
+      switch (i) {
+        case 0: e0 = value; break;
+        case 1: e1 = value; break;
+        case 2: e2 = value; break;
+        default: throw new IndexOutOfRangeException();
+      }
+    }
+  }
+}
+
 [StructLayout(LayoutKind.Sequential)]
 public struct Vec3 {
   public double x;
@@ -521,6 +545,24 @@ public struct JointBreak {
   public BodyId b;
   public ulong user_data;
   public Vec3 force;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public struct AssetJoint {
+  public int a;
+  public int b;
+  public JointOptions options;
+  public int coordinates;
+  public ActuationArray3 actuation;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public struct MachinePlacement {
+  public Transform pose;
+  public Vec3 velocity;
+  public Vec3 angular_velocity;
+  public Bool tied;
+  public Filter filter;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -918,6 +960,16 @@ public static class Native {
   public static extern Result limber_world_set_joint_user_data(IntPtr world, JointId id, ulong data);
   [DllImport(Library)]
   public static extern Result limber_world_joint_user_data(IntPtr world, JointId id, out ulong data);
+  [DllImport(Library)]
+  public static extern UIntPtr limber_asset_joint_count(IntPtr asset);
+  [DllImport(Library)]
+  public static extern Result limber_asset_get_joint(IntPtr asset, UIntPtr joint, out AssetJoint data);
+  [DllImport(Library)]
+  public static extern MachinePlacement limber_default_machine_placement();
+  [DllImport(Library)]
+  public static extern Result limber_world_add_machine(IntPtr world, IntPtr asset, ref MachinePlacement placement, [In, Out] BodyId[] bodies, [In, Out] JointId[] joints);
+  [DllImport(Library)]
+  public static extern Result limber_world_add_machine(IntPtr world, IntPtr asset, IntPtr placement, IntPtr bodies, IntPtr joints);
   [DllImport(Library)]
   public static extern Result limber_world_constraint_report(IntPtr world, out ConstraintReport report);
   [DllImport(Library)]

@@ -207,10 +207,10 @@ function caller(classes, [cls, isStatic, cName, name, result, words]) {
     borrowed = [];
     try {
       const call = [], answers = [], copies = [];
-      let next = 0, list, items = {};
+      let next = 0, list, items = {}, each = [];
       if (result.startsWith('struct ')) call.push(room(sizeOf(result.slice(7))));
       for (const word of words) {
-        const [kind, type, more] = word.split(' ');
+        const [kind, type, more, counter] = word.split(' ');
         const value = ['object', 'struct', 'array', 'filled', 'text', 'number', 'integer', 'wide'].includes(kind) &&
           !(kind === 'object' && cls && !isStatic && call.length === 0) ? given[next++] : this;
         if (kind === 'object') {
@@ -237,6 +237,10 @@ function caller(classes, [cls, isStatic, cName, name, result, words]) {
           }
         } else if (kind === 'text') {
           call.push(value == null ? 0 : array_('bool', new TextEncoder().encode(`${value}\0`), what));
+        } else if (kind === 'each') {
+          const n = given[0][counter]();  // of the asset
+          call.push(room(n * sizeOf(type)));
+          each.push([more, type, n, call.at(-1)]);
         } else if (kind === 'list') {
           list = type;
           call.push(0);
@@ -267,6 +271,8 @@ function caller(classes, [cls, isStatic, cName, name, result, words]) {
         const pointer = read('uint32_t', answers[0][1]), destroy = wasm[`_limber_${made.toLowerCase()}_destroy`];
         return new classes[made](forgotten, pointer, destroy && (() => destroy(pointer)), isStatic ? undefined : this);
       }
+      if (each.length)
+        return Object.fromEntries(each.map(([name, type, n, at]) => [name, Array.from({ length: n }, (_, i) => read(type, at + i * sizeOf(type)))]));
       if (answers.length === 2 && answers[0][0] === 'bool' && !read('bool', answers[0][1])) return null;  // nothing found
       if (answers.length) return read(...answers.at(-1));
       if (result.startsWith('struct ')) return read(result.slice(7), call[0]);

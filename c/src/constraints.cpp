@@ -1,4 +1,5 @@
 #include "limber/core/quaternion.h"
+#include "limber/machine/machine.h"
 #include "objects.h"
 
 namespace limber::c {
@@ -38,6 +39,35 @@ static JointActuation to_cpp(const limber_actuation& a) {
           .drive_stiffness = a.drive_stiffness,
           .drive_damping = a.drive_damping,
           .friction = a.friction};
+}
+
+static limber_actuation to_c(const JointActuation& a) {
+  return {a.motor_velocity, a.motor_max_force, a.drive_target, a.drive_stiffness, a.drive_damping, a.friction};
+}
+
+static limber_asset_joint to_c(const AssetJoint& joint) {
+  const auto& [type, frame, limits, pitch] = joint.spec;
+  limber_asset_joint out{};
+  out.a = joint.a, out.b = joint.b;
+  out.options = limber_default_joint_options();
+  out.options.type = static_cast<limber_joint_type>(type);
+  out.options.frame = to_c(RigidTransform{.q = quaternion_from_matrix(frame.axes), .p = frame.origin});
+  out.options.rotation = to_c(limits.rotation), out.options.cone = limits.cone, out.options.pitch = pitch;
+  for (std::size_t i = 0; i < 2; ++i) out.options.translation[i] = to_c(limits.translation[i]);
+  for (std::size_t i = 0; i < 3; ++i) out.options.euler[i] = to_c(limits.euler[i]);
+  out.options.on_a.radius = out.options.on_b.radius = joint.patch_radius;
+  out.options.collide_connected = joint.collide;
+  out.coordinates = freedoms(type).count();
+  for (std::size_t c = 0; c < joint.coordinates.size(); ++c) out.actuation[c] = to_c(joint.coordinates[c]);
+  return out;
+}
+
+static MachinePlacement to_cpp(const limber_machine_placement& p) {
+  return {.pose = to_cpp(p.pose),
+          .velocity = to_cpp(p.velocity),
+          .angular_velocity = to_cpp(p.angular_velocity),
+          .tied = p.tied,
+          .filter = to_cpp(p.filter)};
 }
 
 static limber_joint_state to_c(const JointView& view) {
@@ -212,6 +242,41 @@ limber_result limber_world_set_joint_user_data(limber_world* world, limber_joint
 
 limber_result limber_world_joint_user_data(const limber_world* world, limber_joint_id id, uint64_t* data) {
   return guarded([&] { required(data, "data") = world_of(world).user_data(to_cpp(id)); });
+}
+
+size_t limber_asset_joint_count(const limber_asset* asset) { return asset != nullptr ? asset->asset.joints.size() : 0; }
+
+limber_result limber_asset_get_joint(const limber_asset* asset, size_t joint, limber_asset_joint* data) {
+  return guarded([&] {
+    const auto& joints = required(asset, "asset").asset.joints;
+    if (joint >= joints.size())
+      throw InvalidArgument("limber_asset_get_joint: joint " + std::to_string(joint) + " of an asset of " +
+                            std::to_string(joints.size()));
+    required(data, "data") = to_c(joints[joint]);
+  });
+}
+
+limber_machine_placement limber_default_machine_placement(void) {
+  const MachinePlacement start{};
+  limber_machine_placement out{};
+  out.pose = to_c(start.pose);
+  out.tied = start.tied;
+  out.filter = limber_default_filter();
+  return out;
+}
+
+limber_result limber_world_add_machine(limber_world* world, const limber_asset* asset,
+                                       const limber_machine_placement* placement, limber_body_id* bodies,
+                                       limber_joint_id* joints) {
+  return guarded([&] {
+    const Asset& of = required(asset, "asset").asset;
+    const auto bodies_out = array(bodies, of.bodies.size(), "bodies");
+    const auto joints_out = array(joints, of.joints.size(), "joints");
+    const limber_machine_placement start = placement != nullptr ? *placement : limber_default_machine_placement();
+    const Machine machine = add_machine(world_of(world), of, to_cpp(start));
+    for (std::size_t i = 0; i < machine.bodies.size(); ++i) bodies_out[i] = to_c(machine.bodies[i]);
+    for (std::size_t i = 0; i < machine.joints.size(); ++i) joints_out[i] = to_c(machine.joints[i]);
+  });
 }
 
 limber_result limber_world_constraint_report(const limber_world* world, limber_constraint_report* report) {

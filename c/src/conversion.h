@@ -26,6 +26,7 @@ inline limber_joint_id to_c(JointId id) { return {id.index, id.generation}; }
 
 inline CollisionFilter to_cpp(const limber_filter& f) { return {.layers = f.layers, .mask = f.mask, .self = f.self}; }
 inline Interval to_cpp(const limber_interval& i) { return {i.low, i.high}; }
+inline limber_interval to_c(const Interval& i) { return {i.low, i.high}; }
 
 /// @throws InvalidArgument for a number that is none of the enumeration's: C takes any
 template <class Enum>

@@ -2,6 +2,7 @@
 
   run:   python3 drop.py drop.glb         limber-simulate is on PATH or in LIMBER_BIN
   see:   drop.glb in a viewer; a second number makes more or fewer balls
+  next:  machine.py
 """
 import pathlib
 import sys

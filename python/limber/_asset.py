@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import functools
 import os
-from typing import Any, Callable, Optional, Sequence, Union
+from typing import Any, Callable, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._library import InvalidArgument, answer, array3, check, create, ffi, lib, vector, view
+from ._library import InvalidArgument, answer, array3, check, create, ffi, lib, numbers, vector, view
 
 Material = Union[str, tuple[float, float, float]]
 
@@ -117,6 +117,37 @@ class Model:
         return view(surface.corner, 3 * surface.triangles, np.int32, self._owner).reshape(-1, 3)
 
 
+class AssetJoint(NamedTuple):
+    """A joint between bodies of an asset, whose bodies stand as in its input."""
+
+    a: Optional[int]
+    """number of a body of `Asset.models`; None: the world"""
+    b: int
+    """moves relative to a"""
+    type: str
+    """"ball", "revolute", "cylindrical", "prismatic", "planar" or "fixed": `World.add_joint`"""
+    position: np.ndarray
+    """(3,): of its frame, in the input's coordinates, m"""
+    rotation: np.ndarray
+    """(4,): unit quaternion (w, x, y, z) of its frame"""
+    rotation_limits: tuple[float, float]
+    """rad; infinite ends are open"""
+    translation_limits: list[tuple[float, float]]
+    """two, m"""
+    cone: float
+    """rad"""
+    euler: list[tuple[float, float]]
+    """three, rad"""
+    pitch: float
+    """m/rad"""
+    patch_radius: float
+    """m"""
+    collide_connected: bool
+
+
+JOINT_TYPES = {value: text.removeprefix("LIMBER_JOINT_").lower() for value, text in ffi.typeof("limber_joint_type").elements.items()}
+
+
 class Asset:
     """One or more bodies that were baked together: `read_asset`, `bake`, `soft_ball`, `soft_box`. Does not change."""
 
@@ -128,6 +159,19 @@ class Asset:
         """Its bodies, in the order of `World.add_body`."""
         return [Model(functools.partial(self._model, i), self._pointer)
                 for i in range(lib.limber_asset_body_count(self._pointer))]
+
+    @property
+    def joints(self) -> list[AssetJoint]:
+        """What joins its bodies, as `World.add_machine` does."""
+        return [self._joint(answer("limber_asset_joint", lib.limber_asset_get_joint, self._pointer, i))
+                for i in range(lib.limber_asset_joint_count(self._pointer))]
+
+    @staticmethod
+    def _joint(joint: Any) -> AssetJoint:
+        o = joint.options
+        limits = lambda intervals: [numbers(i) for i in intervals]
+        return AssetJoint(None if joint.a < 0 else joint.a, joint.b, JOINT_TYPES[o.type], array3(o.frame.p), np.array(numbers(o.frame.q)),
+                          numbers(o.rotation), limits(o.translation), o.cone, limits(o.euler), o.pitch, o.on_a.radius, o.collide_connected)
 
     def _model(self, i: int) -> Any:
         return answer("const limber_model*", lib.limber_asset_model, self._pointer, i)[0]

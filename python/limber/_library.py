@@ -80,6 +80,11 @@ def array3(v: Any) -> np.ndarray:
     return np.array((v.x, v.y, v.z))
 
 
+def numbers(s: Any) -> Any:
+    """Members of a struct."""
+    return tuple(getattr(s, name) for name, _ in ffi.typeof(s).fields)
+
+
 def transform(position: Sequence[float], rotation: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """A pose, as limber_transform takes it. `rotation`: a quaternion (w, x, y, z), or three numbers: a rotation vector, rad."""
     numbers = tuple(float(r) for r in rotation)

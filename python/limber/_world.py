@@ -345,6 +345,15 @@ class Joint(_Named):
         check(lib.limber_world_set_joint_actuation(self._world._pointer, self._id, coordinate, a))
 
 
+class Machine(NamedTuple):
+    """An asset's bodies and joints in a world: `World.add_machine`."""
+
+    bodies: list[Body]
+    """per model of the asset"""
+    joints: list[Optional[Joint]]
+    """per joint of the asset; None for those to the world where it is not tied"""
+
+
 class World:
     """Bodies in a space, moved in fixed steps.
 
@@ -498,6 +507,24 @@ class World:
         world = ffi.new("limber_body_id*")[0]
         return Joint(self, answer("limber_joint_id", lib.limber_world_add_joint, self._pointer,
                                   world if a is None else a._id, world if b is None else b._id, o)[0])
+
+    def add_machine(self, asset: Asset, position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (1, 0, 0, 0),
+                    velocity: Sequence[float] = (0, 0, 0), angular_velocity: Sequence[float] = (0, 0, 0), tied: bool = True,
+                    **filter: int) -> Machine:
+        """All bodies of an asset, as they stand to each other in its input, and its joints with what acts on them.
+
+        `position`, `rotation`: of the input's coordinates in the world. `velocity`, m/s, and `angular_velocity`, rad/s: of the
+        whole, at their origin. `tied`: by its joints to the world; False: it is free. `layers` and `mask`: bits, whom its
+        bodies meet.
+        """
+        p = ffi.new("limber_machine_placement*", lib.limber_default_machine_placement())
+        p.pose, p.tied = transform(position, rotation), tied
+        p.velocity, p.angular_velocity = vector(velocity), vector(angular_velocity)
+        chosen(ffi.addressof(p, "filter"), filter, "a machine")
+        bodies = ffi.new("limber_body_id[]", lib.limber_asset_body_count(asset._pointer))
+        joints = ffi.new("limber_joint_id[]", lib.limber_asset_joint_count(asset._pointer))
+        check(lib.limber_world_add_machine(self._pointer, asset._pointer, p, bodies, joints))
+        return Machine([Body(self, id) for id in bodies], [Joint(self, id) if id.generation else None for id in joints])
 
     @property
     def broken_joints(self) -> list[Joint]:

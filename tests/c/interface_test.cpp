@@ -7,7 +7,9 @@
 #include <thread>
 #include <vector>
 
+#include "jointed_blocks.h"
 #include "limber/limber.h"
+#include "limber/machine/machine.h"
 #include "limber/model/asset.h"
 #include "limber/model/soft_bodies.h"
 
@@ -424,6 +426,47 @@ TEST(CAsset, IsReadFromTheBytesOfItsFile) {
   ASSERT_EQ(limber_model_get_data(model, &data), LIMBER_OK);
   EXPECT_EQ(data.mass, written.bodies[0]->data().mass);
   EXPECT_EQ(data.eigenvalue[5], written.bodies[0]->data().eigenvalues[5]);
+}
+
+TEST(CMachine, MovesAsFromCpp) {
+  const limber::Asset written = limber::testing::jointed_blocks();
+  const std::string bytes = limber::asset_bytes(written);
+  limber_asset* read = nullptr;
+  ASSERT_EQ(limber_asset_read_memory(bytes.data(), bytes.size(), nullptr, &read), LIMBER_OK) << limber_last_error();
+  const Asset asset(read);
+  ASSERT_EQ(limber_asset_joint_count(asset.get()), 2u);
+  limber_asset_joint joint{};
+  EXPECT_EQ(limber_asset_get_joint(asset.get(), 2, &joint), LIMBER_INVALID_ARGUMENT);
+  ASSERT_EQ(limber_asset_get_joint(asset.get(), 1, &joint), LIMBER_OK);
+  EXPECT_EQ(joint.a, 0);
+  EXPECT_EQ(joint.b, 1);
+  EXPECT_EQ(joint.options.type, LIMBER_JOINT_REVOLUTE);
+  EXPECT_EQ(joint.options.frame.p.x, 1.0);
+  EXPECT_NEAR(joint.options.frame.q.w, 0.5, 1e-15);  // a third of a turn takes x to y
+  EXPECT_EQ(joint.options.rotation.high, 0.3);
+  EXPECT_EQ(joint.options.on_b.radius, 0.8);
+  EXPECT_EQ(joint.coordinates, 1);
+  EXPECT_EQ(joint.actuation[0].friction, 0.2);
+
+  const limber::RigidTransform pose{limber::quaternion_from_rotation_vector({0.3, -0.5, 0.9}), {3, 1, 2}};
+  for (const bool tied : {true, false}) {
+    limber_machine_placement start = limber_default_machine_placement();
+    start.pose = {limber_quat_from_rotation_vector({0.3, -0.5, 0.9}), {3, 1, 2}};
+    start.angular_velocity = {0, 0, 1};
+    start.tied = tied;
+    const World world = make_world();
+    limber_body_id bodies[3]{};
+    limber_joint_id joints[2]{};
+    EXPECT_EQ(limber_world_add_machine(world.get(), asset.get(), &start, bodies, nullptr), LIMBER_INVALID_ARGUMENT);
+    ASSERT_EQ(limber_world_add_machine(world.get(), asset.get(), &start, bodies, joints), LIMBER_OK);
+    EXPECT_EQ(limber_world_contains_joint(world.get(), joints[0]), tied);
+    limber_world_step(world.get(), 20);
+
+    limber::World cpp;
+    add_machine(cpp, written, {.pose = pose, .angular_velocity = {0, 0, 1}, .tied = tied});
+    for (int i = 0; i < 20; ++i) cpp.step();
+    EXPECT_EQ(limber_world_state_hash(world.get()), cpp.state_hash());
+  }
 }
 
 TEST(CShape, TellsTheMassOfASolid) {

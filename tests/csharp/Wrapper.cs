@@ -92,6 +92,23 @@ static class Wrapper {
     }
   }
 
+  /// An asset of one body is a machine without joints.
+  static void AMachineIsPlaced() {
+    using (var world = new World())
+    using (var soft = Asset.SoftBall(0.3, 4, 6)) {
+      var start = Native.limber_default_machine_placement();
+      start.pose.p = World.Vector(1, 2, 3);
+      start.angular_velocity = World.Vector(0, 0, 4);
+      BodyId[] bodies;
+      JointId[] joints;
+      world.AddMachine(soft, out bodies, out joints, start);
+      Expect(bodies.Length == 1 && joints.Length == 0 && world.Contains(bodies[0]), "it is a body of the world");
+      var state = world.StateOf(bodies[0]);
+      Near(state.pose.p.z, 3, 0, "where it is put");
+      Near(state.angular_velocity.z, 4, 0, "how it turns");
+    }
+  }
+
   /// Each struct is as large as C's: the library would write beyond a smaller one.
   static void AnswersFillTheirStructs() {
     Near(Marshal.SizeOf(typeof(Placement)), Size("limber_placement"), 0, "Placement");
@@ -100,6 +117,8 @@ static class Wrapper {
     Near(Marshal.SizeOf(typeof(Hit)), Size("limber_hit"), 0, "Hit");
     Near(Marshal.SizeOf(typeof(HitEvent)), Size("limber_hit_event"), 0, "HitEvent");
     Near(Marshal.SizeOf(typeof(ModelData)), Size("limber_model_data"), 0, "ModelData");
+    Near(Marshal.SizeOf(typeof(AssetJoint)), Size("limber_asset_joint"), 0, "AssetJoint");
+    Near(Marshal.SizeOf(typeof(MachinePlacement)), Size("limber_machine_placement"), 0, "MachinePlacement");
     Near(Marshal.SizeOf(typeof(StageTimes)), Size("limber_stage_times"), 0, "StageTimes");
   }
   /// From the command line, as C printed them.
@@ -115,6 +134,7 @@ static class Wrapper {
     ErrorsAreExceptionsWithTheLibrarysLine();
     ABallFalls();
     SurfacesAreWrittenIntoMemory();
+    AMachineIsPlaced();
     AnswersFillTheirStructs();
     return holds ? 0 : 1;
   }

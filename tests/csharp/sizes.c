@@ -11,6 +11,8 @@ int main(void) {
   TELL(limber_hit);
   TELL(limber_hit_event);
   TELL(limber_model_data);
+  TELL(limber_asset_joint);
+  TELL(limber_machine_placement);
   TELL(limber_stage_times);
   printf("\n");
   return 0;

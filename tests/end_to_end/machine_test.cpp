@@ -6,8 +6,8 @@
 
 #include "dense_fem.h"
 #include "limber/core/cross_matrix.h"
+#include "limber/machine/machine.h"
 #include "limber/precompute/bake.h"
-#include "limber/scene/machine.h"
 #include "tet_box.h"
 
 namespace limber {

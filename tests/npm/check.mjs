@@ -44,6 +44,13 @@ const poses = new Float64Array(14);
 world.interpolatedPoses([id, ball], 1, poses);
 assert.deepEqual([...poses.subarray(4, 7)], Object.values(pose.p));
 
+// An asset of one body is a machine without joints.
+const machine = world.addMachine(soft, { pose: { p: [0, 9, 4] }, angularVelocity: { z: 2 } });
+assert.equal(machine.bodies.length, 1);
+assert.deepEqual(machine.joints, []);
+assert.equal(world.bodyState(machine.bodies[0]).pose.p.z, 4);
+assert.throws(() => soft.getJoint(0), error(/joint 0 of an asset of 0/));
+
 // Snapshots.
 const kept = Snapshot.create(), hash = world.stateHash();
 world.saveState(kept);

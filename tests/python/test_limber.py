@@ -274,6 +274,38 @@ def test_a_mesh_is_baked_by_the_program(tmp_path):
         limber.bake(tmp_path / "none.msh")
 
 
+@needs("limber-precompute")
+@needs("make_assembly")
+def test_a_machine_is_baked_and_moves_by_its_joints(tmp_path, world):
+    limber.run("make_assembly", "door", out=tmp_path / "door.obj")
+    asset = limber.bake(tmp_path / "door.obj", auto_joints=True, rigid="*")
+    assert len(asset.models) > 1
+    number, hinge = next((i, joint) for i, joint in enumerate(asset.joints) if joint.type == "revolute")
+    door = world.add_machine(asset, position=(0, 0, 1), layers=2, mask=2)
+    assert len(door.bodies) == len(asset.models) and all(joint.exists for joint in door.joints)
+    leaf = door.bodies[hinge.b]
+    assert leaf.position == pytest.approx(asset.models[hinge.b].origin_in_input + (0, 0, 1), abs=1e-12)
+    joint = door.joints[number]
+    joint.actuate(motor_velocity=0.5, motor_max_force=1e4)
+    world.step(30)
+    low, high = hinge.rotation_limits
+    assert low < joint.coordinates[0] < high
+    assert joint.coordinates[0] == pytest.approx(0.25, abs=0.02)
+    free = limber.World(gravity=(0, 0, 0)).add_machine(asset, tied=False, velocity=(1, 0, 0), angular_velocity=(0, 0, 1))
+    assert free.bodies[0].angular_velocity[2] == pytest.approx(1.0)
+    assert [j is None for j in free.joints] == [j.a is None for j in asset.joints]
+    with pytest.raises(limber.InvalidArgument):
+        world.add_machine(asset, layer=2)
+
+
+@needs("limber-precompute")
+@needs("make_assembly")
+def test_the_drawn_door_opens():
+    first, *_, last = example("machine.py").splitlines()
+    assert first == "revolute joint: door on frame"
+    assert float(last.split()[-2]) == pytest.approx(0.9, abs=0.02)  # 3 s at 0.3 rad/s
+
+
 @needs("limber-joints")
 def test_joints_are_found_by_the_program(tmp_path):
     limber.run("make_assembly", "door", out=tmp_path / "door.obj")

@@ -7,8 +7,8 @@
 
 #include "limber/core/error.h"
 #include "limber/internal/joint_spec_json.h"
+#include "limber/machine/machine.h"
 #include "limber/model/asset.h"
-#include "limber/scene/machine.h"
 #include "reading/contact_reading.h"
 #include "reading/scene_reading.h"
 

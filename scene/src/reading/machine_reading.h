@@ -1,5 +1,5 @@
 /// @file machine_reading.h
-/// Machines of a scene (limber/scene/machine.h) as bodies, joints and pairs.
+/// Machines of a scene (limber/machine/machine.h) as bodies, joints and pairs.
 #pragma once
 
 #include <filesystem>

@@ -130,6 +130,34 @@ LIMBER_API limber_result limber_world_joint_breaks(const limber_world* world, li
 LIMBER_API limber_result limber_world_set_joint_user_data(limber_world* world, limber_joint_id id, uint64_t data);
 LIMBER_API limber_result limber_world_joint_user_data(const limber_world* world, limber_joint_id id, uint64_t* data);
 
+// Machines: assets whose bodies are joined ------------------------------------------------------------------------
+
+/// A joint of an asset, whose bodies stand as in its input.
+typedef struct limber_asset_joint {
+  int32_t a, b;                  ///< numbers of its bodies; b moves relative to a. a is −1: the world
+  limber_joint_options options;  ///< frame in the input's coordinates, m; attachments without patches
+  int coordinates;
+  limber_actuation actuation[3];  ///< of each coordinate
+} limber_asset_joint;
+LIMBER_API size_t limber_asset_joint_count(const limber_asset* asset);
+/// @param joint below limber_asset_joint_count()
+LIMBER_API limber_result limber_asset_get_joint(const limber_asset* asset, size_t joint, limber_asset_joint* data);
+
+/// How a machine starts.
+typedef struct limber_machine_placement {
+  limber_transform pose;         ///< of the input's coordinates, in the world; default the world's own
+  limber_vec3 velocity;          ///< of their origin, world, m/s; bodies move with it as one rigid thing; default 0
+  limber_vec3 angular_velocity;  ///< world, rad/s; default 0
+  bool tied;             ///< by its joints to the world; false: these are left out, and it is free. Default true
+  limber_filter filter;  ///< of all its bodies; default all
+} limber_machine_placement;
+LIMBER_API limber_machine_placement limber_default_machine_placement(void);
+/// Adds all bodies of an asset, its joints with what acts on them, and its pairs without contacts.
+/// @param bodies out, limber_asset_body_count() @param joints out, limber_asset_joint_count(); {0, 0}: left out
+LIMBER_API limber_result limber_world_add_machine(limber_world* world, const limber_asset* asset,
+                                                  const limber_machine_placement* placement, limber_body_id* bodies,
+                                                  limber_joint_id* joints);
+
 /// What contacts, handles and joints took in the last step.
 typedef struct limber_constraint_report {
   int islands, bodies, rows;

@@ -29,7 +29,7 @@ struct AssetJoint {
   friend bool operator==(const AssetJoint&, const AssetJoint&) = default;
 };
 
-/// One or more bodies baked from one input, and what joins them: with joints, a machine (limber/scene/machine.h).
+/// One or more bodies baked from one input, and what joins them: with joints, a machine (limber/machine/machine.h).
 struct Asset {
   std::vector<std::shared_ptr<const ModalModel>> bodies{};
   Provenance provenance{};

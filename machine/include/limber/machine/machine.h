@@ -1,4 +1,4 @@
-/// @file limber/scene/machine.h
+/// @file limber/machine/machine.h
 /// A machine: an asset whose bodies are joined, as limber-precompute bakes it from an assembly (limber/model/asset.h).
 ///
 ///   const Asset lamp = read_asset("lamp.glb");
@@ -34,7 +34,8 @@ struct Machine {
 BodyPlacement placement_in_machine(const ModalModel& model, const MachinePlacement& placement);
 
 /// Adds all bodies as they stand to each other in the asset, its joints with their motors, drives and friction, and its
-/// pairs without contacts. @throws InvalidArgument as World::add_body() and add_joint()
+/// pairs without contacts.
+/// @throws InvalidArgument as World::add_body() and add_joint(); none of the machine's bodies is in the world then
 Machine add_machine(World& world, const Asset& asset, const MachinePlacement& placement = {});
 
 }  // namespace limber
