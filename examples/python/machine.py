@@ -2,6 +2,7 @@
 
   run:   python3 machine.py            limber-precompute is on PATH or in LIMBER_BIN
   see:   parts and joints of the door, then how far its motor has turned it, each second
+  next:  error_vs_time.py
 """
 import pathlib
 import tempfile
