@@ -106,6 +106,7 @@ def chosen(options: Any, given: dict[str, Any], what: str) -> Any:
     return options
 
 
+@functools.cache
 def word(prefix: str, text: str) -> int:
     """The constant of an enumeration that a word names, such as "revolute"."""
     try:

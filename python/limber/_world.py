@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any, Callable, Iterable, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
@@ -30,6 +31,9 @@ position: world, m; normal: out of b into a; impulse: on a over the step, world,
 HIT_EVENT = _record(ffi.typeof("limber_hit_event"))
 """A pair of bodies that came together fast in the last step, as limber_hit_event has it: a, b, user_data_a, user_data_b; position and
 normal of the fastest contact; speed, m/s; impulse of all their contacts on a, N·s."""
+
+
+ALL_LAYERS = 0xFFFFFFFF
 
 
 class Point(NamedTuple):
@@ -75,10 +79,11 @@ class _Named:
     """Something that an id names in a world."""
 
     _kind = ""
+    _pointer_type: Any = None
 
     def __init__(self, world: World, id: Any) -> None:
         self._world = world
-        self._id = ffi.new(ffi.getctype(ffi.typeof(id), "*"), id)[0]  # of its own: `id` may be in a list's memory
+        self._id = ffi.new(self._pointer_type, id)[0]  # of its own: `id` may be in a list's memory
 
     def __eq__(self, other: object) -> bool:
         return (isinstance(other, _Named) and type(other) is type(self) and other._world is self._world
@@ -119,6 +124,7 @@ class Body(_Named):
     """A body of a world; of static bodies and sensors only what every id has."""
 
     _kind = "body"
+    _pointer_type = ffi.typeof("limber_body_id*")
 
     def _state(self) -> Any:
         return answer("limber_body_state", lib.limber_world_body_state, self._world._pointer, self._id)
@@ -253,7 +259,7 @@ class Body(_Named):
         """(V, 3) float32: the drawn surface, deformed, world, m. `out`, `normals`: arrays of that shape that are written in
         place; without `out` a new one. `interpolation`: in [0, 1] between the last two states."""
         if out is None:
-            out = np.empty((self._drawn_vertices(), 3), np.float32)
+            out = np.empty((self._drawn_vertices, 3), np.float32)
         check(lib.limber_world_reconstruct(self._world._pointer, self._id, self._numbers(out),
                                            ffi.NULL if normals is None else self._numbers(normals), interpolation))
         return out
@@ -265,11 +271,12 @@ class Body(_Named):
                                                     ffi.from_buffer("float[]", out)))
         return out
 
+    @functools.cached_property
     def _drawn_vertices(self) -> int:
         return self.model._data.render.vertices
 
     def _numbers(self, array: np.ndarray) -> Any:
-        expected = (self._drawn_vertices(), 3)
+        expected = (self._drawn_vertices, 3)
         if array.shape != expected or array.dtype != np.float32 or not array.flags.c_contiguous:
             raise InvalidArgument(f"an array of {array.dtype} and shape {array.shape}, expected float32 and {expected}")
         return ffi.from_buffer("float[]", array, require_writable=True)
@@ -279,6 +286,7 @@ class Handle(_Named):
     """A point of a body that is held, dragged or pulled: `Body.hold`."""
 
     _kind = "handle"
+    _pointer_type = ffi.typeof("limber_handle_id*")
 
     def move_to(self, position: Sequence[float], velocity: Sequence[float] = (0, 0, 0)) -> None:
         """Where the point is wanted at the end of the coming step, world, m, and how it goes on from there, m/s."""
@@ -307,6 +315,7 @@ class Joint(_Named):
     """A joint between two bodies: `World.add_joint`."""
 
     _kind = "joint"
+    _pointer_type = ffi.typeof("limber_joint_id*")
 
     def _state(self) -> Any:
         return answer("limber_joint_state", lib.limber_world_joint_state, self._world._pointer, self._id)
@@ -608,34 +617,36 @@ class World:
 
     # Queries
 
-    def cast_ray(self, origin: Sequence[float], way: Sequence[float], mask: int = 0xFFFFFFFF,
+    def cast_ray(self, origin: Sequence[float], way: Sequence[float], mask: int = ALL_LAYERS,
                  ignore: Iterable[Body] = ()) -> Optional[Hit]:
         """The first place that a ray from `origin` along `way` (m, as long as the ray) meets. `mask`: layers that may answer."""
         return self._first(lib.limber_world_cast_ray, vector(origin), vector(way), mask, ignore)
 
     def cast_shape(self, shape: Shape, position: Sequence[float], way: Sequence[float],
-                   rotation: Sequence[float] = (1, 0, 0, 0), mask: int = 0xFFFFFFFF,
+                   rotation: Sequence[float] = (1, 0, 0, 0), mask: int = ALL_LAYERS,
                    ignore: Iterable[Body] = ()) -> Optional[Hit]:
         """Where a sphere, capsule, box or hull first touches that is moved along `way` without turning."""
         return self._first(lib.limber_world_cast_shape, shape._pointer, transform(position, rotation), vector(way), mask,
                            ignore)
 
-    def nearest_point(self, point: Sequence[float], max_distance: float, mask: int = 0xFFFFFFFF,
+    def nearest_point(self, point: Sequence[float], max_distance: float, mask: int = ALL_LAYERS,
                       ignore: Iterable[Body] = ()) -> Optional[Hit]:
         """The nearest place of any surface, no farther than `max_distance`, m."""
         return self._first(lib.limber_world_nearest_point, vector(point), max_distance, mask, ignore)
 
     def find_overlaps(self, shape: Shape, position: Sequence[float], rotation: Sequence[float] = (1, 0, 0, 0),
-                      mask: int = 0xFFFFFFFF, ignore: Iterable[Body] = ()) -> list[Body]:
+                      mask: int = ALL_LAYERS, ignore: Iterable[Body] = ()) -> list[Body]:
         """Bodies that a sphere, capsule, box or hull touches or lies in."""
         filter, _accepts = self._filter(mask, ignore)
         return [Body(self, id) for id in self._list("limber_body_id", lib.limber_world_find_overlaps, shape._pointer,
                                                     transform(position, rotation), filter)]
 
     def _filter(self, mask: int, ignore: Iterable[Body]) -> tuple[Any, Any]:
+        ignored = {body._id.index for body in ignore}
+        if not ignored and mask == ALL_LAYERS:
+            return ffi.NULL, None
         filter = ffi.new("limber_query_filter*", lib.limber_default_query_filter())
         filter.mask = mask
-        ignored = {body._id.index for body in ignore}
         if not ignored:
             return filter, None
         accepts = ffi.callback("bool(void*, limber_body_id)", lambda _, id: id.index not in ignored)
