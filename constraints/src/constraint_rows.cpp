@@ -5,7 +5,7 @@
 namespace limber {
 
 void ConstraintRows::clear() {
-  rows_.clear();
+  size_ = 0;
   modal_.clear();
   flexibility_.clear();
   stored_energy_ = 0.0;
@@ -19,15 +19,18 @@ Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowParameter
 }
 
 Index ConstraintRows::add(const RowSide& a, const RowSide& b) {
-  Row& row = rows_.emplace_back();
+  if (size() == static_cast<Index>(rows_.size())) rows_.emplace_back();
+  Row& row = this->row(size_++);
+  row.law = {};
   const bool itself = a.body >= 0 && a.body == b.body;
-  for (std::size_t s = 0; s < (itself ? 1U : 2U); ++s) {
+  for (std::size_t s = 0; s < 2; ++s) {
     const RowSide& from = s == 0 ? a : b;
-    if (from.body < 0) continue;
     Side& side = row.sides[s];
-    side.body = from.body;
-    side.linear = from.linear, side.angular = from.angular;
-    side.modal_begin = modal_.size(), side.modal_count = from.modal.size();
+    if (from.body < 0 || (itself && s == 1)) {
+      side = {};
+      continue;
+    }
+    side = {from.body, from.linear, from.angular, modal_.size(), from.modal.size()};
     if (!from.modal.empty()) modal_.insert(modal_.end(), from.modal.begin(), from.modal.end());
   }
   if (itself) add_to(row.sides[0], b);

@@ -11,72 +11,101 @@ namespace {
 using Hold = GameRow::Hold;
 constexpr double kRecoverySpeed = kConstraintsTuning.small_steps.recovery_speed;
 
-/// A block of a row or of coordinates.
-using Block = Eigen::Matrix<double, 8, 1>;
-Eigen::Map<const Block> block(const double* at) { return Eigen::Map<const Block>(at); }
+/// A block of a row or of coordinates; of a frame's eight, six are used.
+template <int count>
+using Block = Eigen::Matrix<double, count, 1>;
+template <int count>
+Eigen::Map<const Block<count>> block(const double* at) {
+  return Eigen::Map<const Block<count>>(at);
+}
+
+/// x += Σ f row of a block.
+template <int count>
+void add_rows(const double* row, std::int32_t next, std::span<const double> forces, double* x) {
+  Eigen::Map<Block<count>> to(x);
+  std::size_t i = 0;
+  for (; i + 3 <= forces.size(); i += 3, row += 3 * next)  // those of a ball joint in one pass
+    to += forces[i] * block<count>(row) + forces[i + 1] * block<count>(row + next) +
+          forces[i + 2] * block<count>(row + 2 * next);
+  for (; i < forces.size(); ++i, row += next) to += forces[i] * block<count>(row);
+}
 
 }  // namespace
 
 void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
                     int number) {
-  before_.swap(rows_);
-  rows_.clear(), groups_.clear(), numbers_.clear(), led_.clear();
   const SubstepPlan& plan = bodies.plan();
   length_ = plan.length();
   coordinates_ = 8 * bodies.motion().size();
   scales_.assign(bodies.bodies().size(), {});
-  goes_on_ = number > 0;
+  led_.clear();
+  if (number == 0) rows_.clear(), groups_.clear(), numbers_.clear();
   any_bounded_ = false;
-  for (Constraint* constraint : constraints) {
-    constraint->begin_part({.length = length_, .left = length_ * (plan.count - number), .whole = plan.step});
-    add_group(states, bodies, constraint);
+  for (std::size_t g = 0; g < constraints.size(); ++g) {
+    constraints[g]->begin_part({.length = length_, .left = length_ * (plan.count - number), .whole = plan.step});
+    linearise(states, constraints[g]);
+    if (number == 0) add_group(bodies, constraints[g]);
+    write_sides(bodies, groups_[g], false);
+    for (const ConstraintRows::Flexibility& f : made_.flexibility())
+      if (f.i == f.j) made_.row(f.i).law.compliance += f.value / length_;
+    for (std::size_t i = 0; i < groups_[g].count; ++i) write_row(bodies, groups_[g], i);
+    if (number == 0) hold(groups_[g], plan.step);
   }
-  hold_as_before(plan.step);
   scale_turns();
 }
 
-void GameRows::add_group(const BodyStates& states, const GameBodies& bodies, Constraint* constraint) {
+void GameRows::linearise_again(const BodyStates& states, const GameBodies& bodies) {
+  scales_.assign(bodies.bodies().size(), {});
+  led_.clear();
+  for (const GameGroup& group : groups_) {
+    linearise(states, group.constraint);
+    write_sides(bodies, group, true);
+  }
+  scale_turns();
+}
+
+void GameRows::linearise(const BodyStates& states, Constraint* constraint) {
   made_.clear();
   constraint->add_rows(states, StepTime::kStart, length_, made_);
+}
+
+void GameRows::add_group(const GameBodies& bodies, Constraint* constraint) {
   const auto count = static_cast<std::size_t>(made_.size());
-  groups_.push_back({.constraint = constraint, .first = rows_.size(), .count = count, .sides = {}});
-  if (count == 0) return;
-  GameGroup& group = groups_.back();
-  for (std::size_t s = 0; s < 2; ++s) add_side(bodies, group, s);
-  yields_.assign(count, 0.0);
-  for (const ConstraintRows::Flexibility& f : made_.flexibility())
-    if (f.i == f.j) yields_[static_cast<std::size_t>(f.i)] += f.value;
-  for (std::size_t i = 0; i < count; ++i) add_row(bodies, group, i, yields_[i]);
-}
-
-void GameRows::add_side(const GameBodies& bodies, GameGroup& group, std::size_t s) {
-  GameSide& side = group.sides[s];
-  side.frame = bodies.of(made_.row(0).sides[s].body);
-  if (side.frame < 0) return;
-  const GameBody& body = bodies.body(side.frame);
-  side.body = body.first;
-  side.coordinates = 8 * body.blocks;
-  side.at = numbers_.size();
-  numbers_.resize(numbers_.size() + group.count * static_cast<std::size_t>(side.coordinates));
-  for (std::size_t i = 0; i < group.count; ++i) {
-    const ConstraintRows::Side& from = made_.row(static_cast<Index>(i)).sides[s];
-    write_side(body, from, &numbers_[side.at + i * static_cast<std::size_t>(side.coordinates)]);
-    if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
+  GameGroup group{.constraint = constraint, .first = rows_.size(), .count = count, .sides = {}};
+  for (Index i = 0; i < made_.size(); ++i) rows_.push_back({.force = made_.row(i).law.last_force});
+  for (std::size_t s = 0; s < 2 && group.count > 0; ++s) {
+    GameSide& side = group.sides[s];
+    side.frame = bodies.of(made_.row(0).sides[s].body);
+    if (side.frame < 0) continue;
+    const GameBody& body = bodies.body(side.frame);
+    side.body = body.first;
+    side.coordinates = 8 * body.blocks;
+    side.at = numbers_.size();
+    numbers_.resize(numbers_.size() + group.count * static_cast<std::size_t>(side.coordinates));
   }
-  stiffen(body, group, s);
+  groups_.push_back(group);
 }
 
-void GameRows::write_side(const GameBody& body, const ConstraintRows::Side& from, double* to) const {
-  const double linear = body.root_mass > 0.0 ? length_ / body.root_mass : 0.0;
-  const Vec3 turn = body.turn_scale * (length_ * from.angular);
-  for (int i = 0; i < 3; ++i) to[i] = linear * body.goes[i] * from.linear[i], to[3 + i] = turn[i];
-  const std::span<const double> modal = made_.modal(from);
-  for (std::size_t m = 0; m < modal.size(); ++m) to[8 + m] = modal[m] * static_cast<double>(body.modes->roots()[m]);
-}
-
-double GameRows::last_force(const GameGroup& group, std::size_t i) const {
-  const std::size_t at = group.first + i;
-  return goes_on_ && at < before_.size() ? before_[at].force : made_.row(static_cast<Index>(i)).law.last_force;
+/// @param closing for GameRow::closing, else for the forces of the substep before
+void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, bool closing) {
+  for (std::size_t s = 0; s < 2; ++s) {
+    const GameSide& side = group.sides[s];
+    if (side.frame < 0) continue;
+    const GameBody& body = bodies.body(side.frame);
+    const Vec3 shift = body.root_mass > 0.0 ? Vec3(length_ / body.root_mass * body.goes) : Vec3(Vec3::Zero());
+    const Mat3 turn = length_ * body.turn_scale;
+    double* to = &numbers_[side.at];
+    for (std::size_t i = 0; i < group.count; ++i, to += side.coordinates) {
+      const ConstraintRows::Side& from = made_.row(static_cast<Index>(i)).sides[s];
+      Eigen::Map<Vec3>{to} = shift.cwiseProduct(from.linear);
+      Eigen::Map<Vec3>{to + 3} = turn * from.angular;
+      const std::span<const double> modal = made_.modal(from);
+      for (std::size_t m = 0; m < modal.size(); ++m) to[8 + m] = modal[m] * static_cast<double>(body.modes->roots()[m]);
+      std::fill(to + 8 + modal.size(), to + side.coordinates, 0.0);
+      if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
+    }
+    closing ? resist(body, group, s) : stiffen(body, group, s);
+  }
 }
 
 template <class Force>
@@ -85,7 +114,7 @@ GameRows::Pull GameRows::pull(const GameGroup& group, std::size_t s, const Force
   double directions = 0.0;
   for (std::size_t i = 0; i < group.count; ++i) {
     const ConstraintRows::Side& row = made_.row(static_cast<Index>(i)).sides[s];
-    sum.force += force(i) * row.linear;
+    sum.force += force(rows_[group.first + i]) * row.linear;
     sum.arm += row.linear.cross(row.angular);  // across each direction: r again in all but one
     directions += row.linear.squaredNorm();
   }
@@ -97,7 +126,7 @@ GameRows::Pull GameRows::pull(const GameGroup& group, std::size_t s, const Force
 /// A force F at an arm r that pulls outward turns a body back by k = r·F (1 − f fᵀ), f its direction. In units of the
 /// body's inertia, about the axes of its coordinates.
 void GameRows::stiffen(const GameBody& body, const GameGroup& group, std::size_t s) {
-  const Pull at = pull(group, s, [&](std::size_t i) { return last_force(group, i); });
+  const Pull at = pull(group, s, [](const GameRow& row) { return row.force; });
   const double outward = at.force.dot(at.arm);
   if (!(outward > 0.0)) return;
   const Vec3 along = body.turn_scale * at.force;
@@ -111,7 +140,7 @@ void GameRows::stiffen(const GameBody& body, const GameGroup& group, std::size_t
 /// The second derivative of the gaps times their forces, by a turn, is r·F 1 − ½(r Fᵀ + F rᵀ): no more than |r| |F| in
 /// any direction.
 void GameRows::resist(const GameBody& body, const GameGroup& group, std::size_t s) {
-  const Pull at = pull(group, s, [&](std::size_t i) { return rows_[group.first + i].closing; });
+  const Pull at = pull(group, s, [](const GameRow& row) { return row.closing; });
   const double most = at.force.norm() * at.arm.norm();
   Turns& stiffness = scales_[static_cast<std::size_t>(group.sides[s].frame)];
   for (int axis = 0; axis < 3; ++axis)
@@ -133,15 +162,13 @@ void GameRows::scale_turns() {
     }
 }
 
-void GameRows::add_row(const GameBodies& bodies, const GameGroup& group, std::size_t i, double yields) {
+void GameRows::write_row(const GameBodies& bodies, const GameGroup& group, std::size_t i) {
   const RowParameters& law = made_.row(static_cast<Index>(i)).law;
   const double h = length_;
-  GameRow& row = rows_.emplace_back(GameRow{.lower = law.lower / h,
-                                            .upper = law.upper / h,
-                                            .target = h * law.end_rate,
-                                            .compliance = h * law.compliance + yields,
-                                            .rate = h * law.end_rate,
-                                            .force = law.last_force});
+  GameRow& row = rows_[group.first + i];
+  row.lower = law.lower / h, row.upper = law.upper / h;
+  row.target = row.rate = h * law.end_rate;
+  row.compliance = h * law.compliance;
   for (const GameSide& side : group.sides) {
     const double* numbers = this->numbers(side, static_cast<std::int32_t>(i));
     for (std::int32_t b = 1; b < side.coordinates / 8; ++b)
@@ -154,6 +181,7 @@ void GameRows::add_row(const GameBodies& bodies, const GameGroup& group, std::si
   any_bounded_ = any_bounded_ || row.is_bounded();
   row.keeps_place = !law.goes_on && !gives_way && row.compliance == 0.0;
   row.gives_way = !law.goes_on && gives_way && row.compliance == 0.0;
+  row.error = 0.0;
   if (row.compliance > 0.0) {
     row.target += law.offset - law.gap;
   } else if (row.keeps_place) {
@@ -163,42 +191,17 @@ void GameRows::add_row(const GameBodies& bodies, const GameGroup& group, std::si
   } else if (!law.goes_on) {  // a hand of limited force, which pulls until its point is where it is wanted
     row.target -= std::clamp(law.gap, -h * kRecoverySpeed, h * kRecoverySpeed);
   }
+  if (row.hold != Hold::kMet) row.force = row.hold == Hold::kLower ? row.lower : row.upper;
 }
 
-/// Rows with bounds begin as they ended the last substep.
-void GameRows::hold_as_before(double step) {
-  const bool known = goes_on_ && before_.size() == rows_.size();
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    GameRow& row = rows_[i];
-    row.left =
-        known ? before_[i].left : row.error - std::clamp(row.error, -step * kRecoverySpeed, step * kRecoverySpeed);
-    if (known)
-      row.hold = before_[i].hold;
-    else if (row.is_bounded())
-      row.hold = row.force <= row.lower ? Hold::kLower : row.force >= row.upper ? Hold::kUpper : Hold::kMet;
-    if (row.hold != Hold::kMet)
-      row.force = row.hold == Hold::kLower ? row.lower : row.upper;
-    else if (known)
-      row.force = before_[i].force;
+/// Of a step's first substep. In the others rows with bounds begin as they ended the last one.
+void GameRows::hold(const GameGroup& group, double step) {
+  for (GameRow& row : of(group)) {
+    row.left = row.error - std::clamp(row.error, -step * kRecoverySpeed, step * kRecoverySpeed);
+    if (!row.is_bounded() || (row.force > row.lower && row.force < row.upper)) continue;
+    row.hold = row.force <= row.lower ? Hold::kLower : Hold::kUpper;
+    row.force = row.hold == Hold::kLower ? row.lower : row.upper;
   }
-}
-
-void GameRows::linearise_again(const BodyStates& states, const GameBodies& bodies) {
-  scales_.assign(bodies.bodies().size(), {});
-  for (const GameGroup& group : groups_) {
-    made_.clear();
-    group.constraint->add_rows(states, StepTime::kStart, length_, made_);
-    for (std::size_t s = 0; s < 2; ++s) {
-      const GameSide& side = group.sides[s];
-      if (side.frame < 0) continue;
-      const GameBody& body = bodies.body(side.frame);
-      double* row = &numbers_[side.at];
-      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates)
-        write_side(body, made_.row(static_cast<Index>(i)).sides[s], row);
-      resist(body, group, s);
-    }
-  }
-  scale_turns();
 }
 
 void GameRows::add_what_leads(const GameBodies& bodies) {
@@ -247,27 +250,27 @@ void GameRows::scale_pushes(std::span<const RowBody> at, const std::vector<Block
 }
 
 void GameRows::multiply(const GameGroup& group, std::span<const double> x, double* product) const {
-  for (std::size_t i = 0; i < group.count; ++i) {
-    double sum = 0.0;
-    for (const GameSide& side : group.sides) {
-      const double *row = numbers(side, static_cast<std::int32_t>(i)), *from = x.data() + 8 * side.body;
-      for (std::int32_t k = 0; k < side.coordinates; k += 8) sum += block(row + k).dot(block(from + k));
+  std::fill_n(product, group.count, 0.0);
+  for (const GameSide& side : group.sides) {
+    if (side.frame < 0) continue;
+    const double *row = numbers(side, 0), *from = x.data() + 8 * side.body;
+    for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates) {
+      double sum = block<6>(row).dot(block<6>(from));
+      for (std::int32_t k = 8; k < side.coordinates; k += 8) sum += block<8>(row + k).dot(block<8>(from + k));
+      product[i] += sum;
     }
-    product[i] = sum;
   }
 }
 
 void GameRows::add_transposed(const GameGroup& group, const double* forces, std::span<double> x) const {
-  for (const GameSide& side : group.sides)
-    for (std::int32_t k = 0; k < side.coordinates; k += 8) {
-      Eigen::Map<Block> to(x.data() + 8 * side.body + k);
-      const double* row = numbers(side, 0) + k;
-      const std::int32_t next = side.coordinates;
-      std::size_t i = 0;
-      for (; i + 3 <= group.count; i += 3, row += 3 * next)  // those of a ball joint in one pass
-        to += forces[i] * block(row) + forces[i + 1] * block(row + next) + forces[i + 2] * block(row + 2 * next);
-      for (; i < group.count; ++i, row += next) to += forces[i] * block(row);
-    }
+  for (const GameSide& side : group.sides) {
+    if (side.frame < 0) continue;
+    const double* row = numbers(side, 0);
+    double* to = x.data() + 8 * side.body;
+    add_rows<6>(row, side.coordinates, {forces, group.count}, to);
+    for (std::int32_t k = 8; k < side.coordinates; k += 8)
+      add_rows<8>(row + k, side.coordinates, {forces, group.count}, to + k);
+  }
 }
 
 }  // namespace limber::internal

@@ -102,9 +102,9 @@ class GameRows {
   };
   using Turns = std::array<double, 3>;  // by axis of the inertia
 
-  void add_group(const BodyStates& states, const GameBodies& bodies, Constraint* constraint);
-  void add_side(const GameBodies& bodies, GameGroup& group, std::size_t s);
-  void write_side(const GameBody& body, const ConstraintRows::Side& from, double* to) const;
+  void linearise(const BodyStates& states, Constraint* constraint);
+  void add_group(const GameBodies& bodies, Constraint* constraint);
+  void write_sides(const GameBodies& bodies, const GameGroup& group, bool closing);
   /// Of one side of the rows at hand: what their forces pull with, and where they act from the body's origin, world.
   struct Pull {
     Vec3 force = Vec3::Zero(), arm = Vec3::Zero();  // zero where they hold less than two directions
@@ -113,21 +113,19 @@ class GameRows {
   Pull pull(const GameGroup& group, std::size_t s, const Force& force) const;
   void stiffen(const GameBody& body, const GameGroup& group, std::size_t s);
   void resist(const GameBody& body, const GameGroup& group, std::size_t s);
-  double last_force(const GameGroup& group, std::size_t i) const;
-  void add_row(const GameBodies& bodies, const GameGroup& group, std::size_t i, double yields);
-  void hold_as_before(double step);
+  void write_row(const GameBodies& bodies, const GameGroup& group, std::size_t i);
+  void hold(const GameGroup& group, double step);
   void scale_turns();
 
-  std::vector<GameRow> rows_, before_;  // of this substep and of the one before
+  std::vector<GameRow> rows_;
   std::vector<GameGroup> groups_;
   std::vector<double> numbers_;  // J
   std::vector<Turns> scales_;    // by frame: x/y of its turn
   std::vector<Led> led_;
   ConstraintRows made_;
-  std::vector<double> yields_, slope_;  // scratch
+  std::vector<double> slope_;  // scratch
   std::size_t coordinates_ = 0;
   double length_ = 0.0;
-  bool goes_on_ = false;  // the rows are those of the substep before
   bool any_bounded_ = false;
 };
 

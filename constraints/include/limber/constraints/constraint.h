@@ -77,7 +77,7 @@ class Constraint {
   virtual void begin_part(const PartOfStep&) {}
   /// Appends the rows, linearised at the step's start, at its predicted end or in the middle, where J (Δp, τ, Δz) is
   /// to be what the gap changes by over the step, so that forces do the work that they are to do: as many, in the same
-  /// order. Laws count at the start and at the end.
+  /// order, in all parts of a step. Laws count at the start and at the end.
   virtual void add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) = 0;
   /// The gaps of the rows in the order in which they were appended. At the step's start with what the rows' flexibility
   /// then gives, at its end without. @param gaps as many numbers

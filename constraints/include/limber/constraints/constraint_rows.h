@@ -129,7 +129,7 @@ class ConstraintRows {
   /// Takes the modal part of one side of a row from rows of the same constraints at another time.
   void take_modal(const ConstraintRows& from, Index row, std::size_t side);
 
-  Index size() const { return static_cast<Index>(rows_.size()); }
+  Index size() const { return size_; }
   const Row& row(Index i) const { return rows_[static_cast<std::size_t>(i)]; }
   Row& row(Index i) { return rows_[static_cast<std::size_t>(i)]; }
   std::span<const double> modal(const Side& side) const { return {modal_.data() + side.modal_begin, side.modal_count}; }
@@ -139,7 +139,8 @@ class ConstraintRows {
  private:
   void add_to(Side& side, const RowSide& other);
 
-  std::vector<Row> rows_;
+  std::vector<Row> rows_;  // the first size_, and others for later
+  Index size_ = 0;
   std::vector<Flexibility> flexibility_;
   double stored_energy_ = 0.0;
   std::vector<double> modal_;
