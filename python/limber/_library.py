@@ -46,6 +46,20 @@ def answer(kind: str, function: Any, *arguments: Any) -> Any:
     return out
 
 
+class Answer:
+    """Where the same question is answered again and again, of a world, which one thread at a time uses. `members`: paths of
+    vectors in the struct."""
+
+    def __init__(self, kind: str, **members: Sequence[str]) -> None:
+        self.pointer = ffi.new(kind + "*")
+        self._vectors = {name: np.frombuffer(ffi.buffer(self.pointer), np.float64, 4 if path[-1] == "q" else 3, ffi.offsetof(kind, *path))
+                         for name, path in members.items()}
+
+    def vector(self, name: str) -> np.ndarray:
+        """(3,), or (4,) of a quaternion; a copy"""
+        return self._vectors[name].copy()
+
+
 def create(kind: str, function: Any, *arguments: Any) -> Any:
     """Calls a function that makes an object, which is destroyed with what holds the pointer."""
     pointer = answer(kind + "*", function, *arguments)[0]

@@ -8,7 +8,7 @@ from typing import Any, Callable, Iterable, NamedTuple, Optional, Sequence, Unio
 import numpy as np
 
 from ._asset import Asset, Model, Shape
-from ._library import InvalidArgument, answer, array3, check, chosen, create, ffi, lib, transform, vector, word
+from ._library import Answer, InvalidArgument, answer, array3, check, chosen, create, ffi, lib, transform, vector, word
 
 
 def _record(ctype: Any) -> Any:
@@ -126,40 +126,41 @@ class Body(_Named):
     _kind = "body"
     _pointer_type = ffi.typeof("limber_body_id*")
 
-    def _state(self) -> Any:
-        return answer("limber_body_state", lib.limber_world_body_state, self._world._pointer, self._id)
+    def _state(self) -> Answer:
+        state = self._world._body_state
+        check(lib.limber_world_body_state(self._world._pointer, self._id, state.pointer))
+        return state
 
     @property
     def position(self) -> np.ndarray:
         """(3,): the body's origin, its centre of mass, world, m"""
-        return array3(self._state().pose.p)
+        return self._state().vector("position")
 
     @property
     def rotation(self) -> np.ndarray:
         """(4,): unit quaternion (w, x, y, z) from body to world axes"""
-        q = self._state().pose.q
-        return np.array((q.w, q.x, q.y, q.z))
+        return self._state().vector("rotation")
 
     @property
     def velocity(self) -> np.ndarray:
         """(3,): of the body's origin, world, m/s"""
-        return array3(self._state().velocity)
+        return self._state().vector("velocity")
 
     @property
     def angular_velocity(self) -> np.ndarray:
         """(3,), world, rad/s"""
-        return array3(self._state().angular_velocity)
+        return self._state().vector("angular_velocity")
 
     @property
     def amplitudes(self) -> np.ndarray:
         """(k,): z of the modes, kg^½·m; a copy"""
-        s = self._state()
+        s = self._state().pointer
         return np.frombuffer(ffi.buffer(s.amplitude, 8 * s.modes), np.float64).copy() if s.modes else np.empty(0)
 
     @property
     def rates(self) -> np.ndarray:
         """(k,): ż, kg^½·m/s; a copy"""
-        s = self._state()
+        s = self._state().pointer
         return np.frombuffer(ffi.buffer(s.rate, 8 * s.modes), np.float64).copy() if s.modes else np.empty(0)
 
     def set_pose(self, position: Sequence[float], rotation: Sequence[float] = (1, 0, 0, 0)) -> None:
@@ -202,7 +203,7 @@ class Body(_Named):
     @property
     def surface_velocity(self) -> np.ndarray:
         """(3,): how the surface runs over the body, as a conveyor's belt does, body axes, m/s"""
-        return array3(answer("limber_vec3", lib.limber_world_surface_velocity, self._world._pointer, self._id))
+        return self._world._ask(lib.limber_world_surface_velocity, self._id)
 
     @surface_velocity.setter
     def surface_velocity(self, velocity: Sequence[float]) -> None:
@@ -241,11 +242,11 @@ class Body(_Named):
 
     def point_position(self, at: Union[int, Point]) -> np.ndarray:
         """(3,): a surface point, deformed, world, m"""
-        return array3(answer("limber_vec3", lib.limber_world_point_position, self._world._pointer, self._id, _point(at)))
+        return self._world._ask(lib.limber_world_point_position, self._id, _point(at))
 
     def point_velocity(self, at: Union[int, Point]) -> np.ndarray:
         """(3,): of a surface point, deformation included, world, m/s"""
-        return array3(answer("limber_vec3", lib.limber_world_point_velocity, self._world._pointer, self._id, _point(at)))
+        return self._world._ask(lib.limber_world_point_velocity, self._id, _point(at))
 
     def hold(self, at: Union[int, Point], **options: Any) -> Handle:
         """Takes hold of a point where it is now. Options: max_force (N), stiffness (N/m), damping (N·s/m)."""
@@ -379,8 +380,17 @@ class World:
         chosen(o, dict(options, step=step, gravity=vector(gravity)), "a world")
         self._pointer = create("limber_world", lib.limber_world_create, o)
         self._veto: Any = None
+        self._vector = Answer("limber_vec3", vector=["x"])
+        self._body_state = Answer("limber_body_state", position=["pose", "p"], rotation=["pose", "q"], velocity=["velocity"],
+                                  angular_velocity=["angular_velocity"])
+        self._found = Answer("bool")
+        self._hit = Answer("limber_hit", position=["position"], normal=["normal"])
         if contacts is not False:
             self.set_contacts(contacts)
+
+    def _ask(self, function: Any, *arguments: Any) -> np.ndarray:
+        check(function(self._pointer, *arguments, self._vector.pointer))
+        return self._vector.vector("vector")
 
     def __repr__(self) -> str:
         return f"<limber.World of {lib.limber_world_body_count(self._pointer)} bodies at {self.time:g} s>"
@@ -596,7 +606,7 @@ class World:
 
     def contact_impulse(self, a: Body, b: Body) -> np.ndarray:
         """(3,): of all contacts of two bodies in the last step, on a, world, N·s"""
-        return array3(answer("limber_vec3", lib.limber_world_contact_impulse, self._pointer, a._id, b._id))
+        return self._ask(lib.limber_world_contact_impulse, a._id, b._id)
 
     def set_contact_veto(self, veto: Optional[Callable[[Optional[Body], Optional[Body]], bool]]) -> None:
         """Asked of every contact found between two bodies, before it acts: True leaves it out. It must not change the world,
@@ -656,14 +666,15 @@ class World:
     def _first(self, function: Any, *arguments: Any) -> Optional[Hit]:
         *place, mask, ignore = arguments
         filter, _accepts = self._filter(mask, ignore)
-        found, hit = ffi.new("bool*"), ffi.new("limber_hit*")
+        hit = self._hit.pointer
+        found = self._found.pointer
         check(function(self._pointer, *place, filter, found, hit))
         if not found[0]:
             return None
         at = hit.at
         surface = "render" if at.surface == lib.LIMBER_SURFACE_RENDER else "collision"
         point = Point(at.triangle, tuple(at.weight), surface) if hit.has_point else None
-        return Hit(Body(self, hit.body), point, array3(hit.position), array3(hit.normal), hit.fraction, hit.distance)
+        return Hit(Body(self, hit.body), point, self._hit.vector("position"), self._hit.vector("normal"), hit.fraction, hit.distance)
 
     # Rollback
 
