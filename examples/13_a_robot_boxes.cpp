@@ -1,7 +1,7 @@
 // 13_a_robot_boxes: can a jointed doll box like the man whose motion was recorded?
 //   bake:  make_assembly humanoid --out humanoid.obj
 //   run:   13_a_robot_boxes humanoid.obj humanoid.joints.json /usr/share/assimp/models/BVH/Boxing_Toes.bvh
-//   see:   ten seconds of boxing in boxing.glb (any glTF viewer), and how near the doll comes: its arms are not as long as
+//   see:   four seconds of boxing in boxing.glb (any glTF viewer), and how near the doll comes: its arms are not as long as
 //          the man's, and it has no waist and no wrists
 //   next:  docs/formats/mapping.md, limber-pose --clip
 #include <algorithm>
@@ -24,7 +24,7 @@ int main(int argc, char** argv) try {
   for (limber::ModelJoint& joint : doll.joints) joint.joint.limits = {};
 
   limber::MappingFile mapping;
-  mapping.end = 10.0;
+  mapping.end = 4.0;
   mapping.points = {{"Hips", "torso", {0.0, 0.0, 0.95}},
                     {"Neck", "torso", {0.0, 0.0, 1.4}},
                     {"LeftShoulder", "torso", {-0.12, 0.0, 1.36}},
