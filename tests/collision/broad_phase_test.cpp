@@ -9,6 +9,7 @@
 #include <random>
 #include <set>
 
+#include "asked.h"
 #include "constants.h"
 #include "counted_new.h"
 #include "instruction_sets.h"
@@ -128,7 +129,7 @@ TEST(BroadPhase, FindsWhatEveryPairLookedAtGivesWhileBodiesMoveSleepComeAndGo) {
     }
   }
   std::size_t pairs_seen = 0;
-  for (int step = 0; step < 200; ++step) {
+  for (int step = 0; step < testing::all_or_tenth(200); ++step) {
     const double margin = step % 3 == 0 ? 0.0 : random.uniform(0, 0.2);
     const auto expected = both.expected(margin);
     ASSERT_EQ(both.found(margin), expected) << "step " << step;
@@ -159,7 +160,7 @@ TEST(BroadPhase, FindsWhatEveryPairLookedAtGivesWhileBodiesMoveSleepComeAndGo) {
       }
     }
   }
-  EXPECT_GT(pairs_seen, 10000u);
+  EXPECT_GT(pairs_seen, testing::all_or_tenth(10000u));
 }
 
 TEST(BroadPhase, ThousandsOfBodiesOnAnyThreadCountAndInstructionSetGiveThePairsOfBruteForce) {

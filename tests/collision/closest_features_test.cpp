@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "asked.h"
 #include "contact_reference.h"
 #include "random_states.h"
 
@@ -53,7 +54,7 @@ void expect_consistent(const SurfaceFoot& foot, const std::array<Vec3, N>& x) {
 
 TEST(ClosestFeatures, PointToTriangleIsTheLeastOverAllActiveSets) {
   Random random(1);
-  for (int trial = 0; trial < 10000; ++trial) {
+  for (int trial = 0; trial < testing::all_or_tenth(10000); ++trial) {
     const TrianglePoints t = troublesome_triangle(random);
     const Vec3 p = random.index(4) == 0 ? t[0] : random.vector(1.5);
     const SurfaceFoot foot = closest_on_triangle(p, t);
@@ -68,7 +69,7 @@ TEST(ClosestFeatures, PointToTriangleIsTheLeastOverAllActiveSets) {
 
 TEST(ClosestFeatures, SegmentPairsAreTheLeastOverAllActiveSets) {
   Random random(2);
-  for (int trial = 0; trial < 10000; ++trial) {
+  for (int trial = 0; trial < testing::all_or_tenth(10000); ++trial) {
     const TrianglePoints t = troublesome_triangle(random), u = troublesome_triangle(random);
     const SegmentPoints a{t[0], t[1]};
     SegmentPoints b{u[0], u[1]};
@@ -87,7 +88,7 @@ TEST(ClosestFeatures, SegmentPairsAreTheLeastOverAllActiveSets) {
 TEST(ClosestFeatures, TrianglePairsAreTheLeastOverAllActiveSets) {
   Random random(3);
   int crossing = 0;
-  for (int trial = 0; trial < 10000; ++trial) {
+  for (int trial = 0; trial < testing::all_or_tenth(10000); ++trial) {
     const TrianglePoints a = troublesome_triangle(random), b = troublesome_triangle(random);
     const ClosestOrCrossing c = closest_points(a, b);
     const double reference = hull_distance(a, b).distance;
@@ -100,12 +101,12 @@ TEST(ClosestFeatures, TrianglePairsAreTheLeastOverAllActiveSets) {
       EXPECT_LE((closest_on_triangle(end, b).point - end).norm(), 10 * kLength);
     }
   }
-  EXPECT_GT(crossing, 500);
+  EXPECT_GT(crossing, testing::all_or_tenth(500));
 }
 
 TEST(ClosestFeatures, SegmentAndTriangleAreTheLeastOverAllActiveSets) {
   Random random(4);
-  for (int trial = 0; trial < 10000; ++trial) {
+  for (int trial = 0; trial < testing::all_or_tenth(10000); ++trial) {
     const TrianglePoints t = troublesome_triangle(random), b = troublesome_triangle(random);
     const SegmentPoints a{t[0], t[1]};
     ASSERT_NEAR(closest_points(a, b).distance, hull_distance(a, b).distance, 10 * kLength) << "trial " << trial;
@@ -157,7 +158,7 @@ TEST(ConvexDistance, IsProvenByTheSeparatingPlane) {
 
 TEST(ConvexDistance, PointsAreInTheSolidsAndNormalsThoseOfAllActiveSets) {
   Random random(6);
-  for (int trial = 0; trial < 1000; ++trial) {
+  for (int trial = 0; trial < testing::all_or_tenth(1000); ++trial) {
     const auto a = cloud(random, 4, Vec3::Zero(), 0.5);
     const auto b = cloud(random, 1 + random.index(5), random.vector(1.2), 0.5);
     const ConvexDistance d = distance(ConvexSolid{a}, ConvexSolid{b});

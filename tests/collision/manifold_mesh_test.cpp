@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "asked.h"
 #include "limber/collision/contact_finder.h"
 #include "limber/collision/manifold_finder.h"
 #include "sliding_body.h"
@@ -118,7 +119,7 @@ std::vector<Floor> flat_floors() {
 
 TEST(ManifoldSeams, AFrictionlessCubeKeepsItsSpeedOverTenMetresOfAnyFlatFloor) {
   for (const Floor& floor : flat_floors())
-    for (const double speed : {0.5, 2.0, 7.0})
+    for (const double speed : testing::all_or_first<double>({7.0, 2.0, 0.5}))
       for (const double turn : {0.0, 0.3, std::numbers::pi / 6.0}) {
         ContactScene scene;
         floor.add(scene);
@@ -153,7 +154,7 @@ TEST(ManifoldSeams, ACubeLandsOnAnyFlatFloorAndGoesOn) {
 
 TEST(ManifoldSeams, ABallRollsFourMetresOnAnyFlatFloor) {
   for (const Floor& floor : flat_floors())
-    for (const double speed : {0.5, 2.0, 5.0}) {
+    for (const double speed : testing::all_or_first<double>({5.0, 2.0, 0.5})) {
       ContactScene scene;
       floor.add(scene);
       SlidingBody ball(scene, Sphere{0.1}, {{}, {0.0, 0.03, 0.1}}, 0.5);

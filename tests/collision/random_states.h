@@ -2,19 +2,16 @@
 #pragma once
 
 #include <cmath>
-#include <cstdlib>
 #include <random>
 #include <vector>
 
+#include "asked.h"
 #include "limber/core/rigid_transform.h"
 
 namespace limber::testing {
 
 /// How many random cases a test looks at; the CTest entries of label `campaign` ask for more.
-inline int trials(int usual) {
-  const char* asked = std::getenv("LIMBER_TRIALS");
-  return asked == nullptr ? usual : std::atoi(asked);
-}
+inline int trials(int usual) { return asked("LIMBER_TRIALS", all_or_tenth(usual)); }
 
 class Random {
  public:

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "asked.h"
 #include "random_states.h"
 #include "solid_bodies.h"
 
@@ -48,7 +49,7 @@ ContactPoint at_point(Body& bar, const Vec3& p, OverlapMethod overlap) {
 
 // Bent without being stretched along its middle, a bar's thickness stays what it was.
 TEST(RestDepth, IsTheDepthOfTheNearestPointInABentBar) {
-  for (const double degrees : {10.0, 30.0, 60.0, 90.0}) {
+  for (const double degrees : testing::all_or_first<double>({90.0, 10.0, 30.0, 60.0})) {
     const double angle = degrees * std::numbers::pi / 180.0;
     Body bar(arc(angle));
     bar.use_volume();

@@ -114,7 +114,7 @@ TEST(WorldContact, ABoxSlidesOverAFloorOfBoxesAndOfTrianglesAsOverAPlane) {
   constexpr double kGameLoss = 1e-3;  // of the speed
   HeightField field{.columns = 41, .rows = 5, .spacing_x = 0.25, .spacing_y = 0.25, .heights = {}};
   field.heights.assign(41 * 5, 0.0f);
-  for (const double speed : {1.0, 3.0, 10.0})
+  for (const double speed : all_or_first<double>({3.0, 1.0, 10.0}))
     for (const double yaw : {0.0, 0.3}) {
       SCOPED_TRACE(::testing::Message() << speed << " m/s, turned by " << yaw);
       for (const bool tiles : {true, false}) {
@@ -227,7 +227,7 @@ std::vector<std::uint64_t> hashes_of_islands_in_contact(Jobs& jobs) {
 
 TEST(WorldContact, StateHashIsTheSameForAnyThreadCount) {
   const std::vector<std::uint64_t> serial = hashes_of_islands_in_contact(serial_jobs());
-  for (const int threads : {1, 2, 3, 8}) {
+  for (const int threads : all_or_first<int>({3, 1, 2, 8})) {
     ThreadJobs jobs(threads);
     EXPECT_EQ(hashes_of_islands_in_contact(jobs), serial) << threads << " threads";
   }

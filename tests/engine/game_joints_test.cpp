@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "asked.h"
 #include "grounded_world.h"
 
 namespace limber::testing {
@@ -87,7 +88,7 @@ TEST(GameJoints, AChainSwingsAsTheExactSolverHasIt) {
 }
 
 TEST(GameJoints, AHeavyEndHangsWithoutSag) {
-  for (const double times : {100.0, 1e4}) {
+  for (const double times : all_or_first<double>({1e4, 100.0})) {
     Chain chain(10, -Vec3::UnitZ(), times);
     const double before = chain.world.body(chain.bodies.back()).pose.p.z();
     chain.step(120);

@@ -25,7 +25,7 @@ namespace {
 constexpr std::array kSteps = {1.0 / 240.0, 1.0 / 120.0, 1.0 / 60.0, 1.0 / 30.0, 1.0 / 10.0};
 constexpr double kSide = 0.4;
 constexpr int kSheetCells = 20;
-constexpr int kShots = kSanitized ? 10 : 60;
+constexpr int kShots = 60;
 
 std::shared_ptr<const ModalModel> rigid(double size, double mass) {
   ModalModelData d = sample_model_data({.modes = 0, .half_extent = Vec3::Constant(size)});

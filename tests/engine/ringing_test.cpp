@@ -3,10 +3,10 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
+#include "asked.h"
 #include "constants.h"
 #include "limber/engine/world.h"
 #include "sample_models.h"
@@ -20,8 +20,7 @@ using testing::sample_model;
 /// A million steps; `LIMBER_TRIALS` says otherwise. Each rounds amplitude and rate once: at worst N ε, and the turn of
 /// the phase, which one rounding of its cosine and sine shifts by ε a step, the same each time.
 TEST(WorldRinging, IsWhereItShouldBeAfterAnyNumberOfSteps) {
-  const char* trials = std::getenv("LIMBER_TRIALS");
-  const double steps = trials != nullptr ? std::atof(trials) : 1e6, step = 1.0 / 60.0;
+  const double steps = testing::asked("LIMBER_TRIALS", testing::all_or_tenth(1000000)), step = 1.0 / 60.0;
   const auto model = sample_model({.modes = 1, .lowest_hz = 7.3});
   World world({.step = step, .gravity = Vec3::Zero()});
   const BodyId bell = world.add_body(model);

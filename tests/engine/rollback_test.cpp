@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "asked.h"
 #include "counted_new.h"
 #include "grounded_world.h"
 #include "limber/core/error.h"
@@ -75,7 +76,7 @@ TEST(Rollback, ImpactsAndRollingGoOn) {
   scene.world.add_body(damped_box(0, 60.0), {.pose = {{}, {1.0, 0.0, 0.3}},
                                              .velocity = {1.0, 0.0, 0.0},
                                              .shape = std::make_shared<const Shape>(Sphere{0.1})});
-  for (const int before : {3, 12, 30}) expect_same_future({scene.world}, before, 20);
+  for (const int before : all_or_first<int>({3, 12, 30})) expect_same_future({scene.world}, before, 20);
 }
 
 TEST(Rollback, SleepersSleepOnAndWakeAtTheSameStep) {

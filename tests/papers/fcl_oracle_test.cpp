@@ -16,6 +16,7 @@
 #include <variant>
 #include <vector>
 
+#include "asked.h"
 #include "finder_scenes.h"
 #include "limber/collision/collision_surface.h"
 #include "limber/collision_fcl/fcl_contact_source.h"
@@ -26,7 +27,6 @@ namespace {
 
 using testing::ContactScene;
 using testing::Random;
-using testing::trials;
 
 /// What FCL and limber may differ by on gaps of bodies of about 1 m: some hundred roundings of FCL's projections.
 constexpr double kOracleGap = 1e-9;
@@ -309,14 +309,15 @@ TEST(FclOracle, PairsOfSolidsTouchAlikeWithGapsDepthsAndNormalsAlike) {
   for (const Kind& k : solids()) all.push_back(&k);
   for (const Kind& k : rounds()) all.push_back(&k);
   Tally tally;
+  const int trials = testing::asked("LIMBER_TRIALS", 12);  // of each pair
   for (std::size_t i = 0; i < all.size(); ++i)
     for (std::size_t j = i; j < all.size(); ++j) {
       SCOPED_TRACE(all[i]->name + " and " + all[j]->name);
-      for (int trial = 0; trial < trials(12); ++trial) compare(random_pair(*all[i], *all[j], random), random, tally);
+      for (int trial = 0; trial < trials; ++trial) compare(random_pair(*all[i], *all[j], random), random, tally);
     }
-  EXPECT_GT(tally.apart, trials(12));
-  EXPECT_GT(tally.overlapping, trials(12));
-  EXPECT_GT(tally.corners, trials(12));
+  EXPECT_GT(tally.apart, trials);
+  EXPECT_GT(tally.overlapping, trials);
+  EXPECT_GT(tally.corners, trials);
   EXPECT_LE(tally.other_face, tally.corners / 50);
 }
 

@@ -26,4 +26,10 @@ std::vector<T> all_or_first(std::vector<T> all) {
   return all;
 }
 
+/// How many trials a test makes, or in how many it sees what it looks for: all; under sanitizers a tenth.
+template <class Number>
+constexpr Number all_or_tenth(Number all) {
+  return kSanitized ? (all + 9) / 10 : all;
+}
+
 }  // namespace limber::testing
