@@ -167,6 +167,8 @@ struct FieldTuning {
   /// Of the other body's longest side, cells of a field that is fine enough for it [4 to 16]. [path] Otherwise
   /// triangles.
   double cells_of_the_other = 8.0;
+  /// Directions along which it is looked whether bodies stay apart [4 to 16]: time alone, but for what goes by.
+  int looks_apart = 8;
   double deepest_exit = 2.0;  ///< of its deepest nearest point: a patch's longest way out [1.4 to 4]. [path]
 };
 

@@ -387,6 +387,31 @@ TEST(FieldContacts, TellsWhatTheExpectedMotionOfItsPointsCloses) {
   }
 }
 
+// Directions along which two bodies may part save time: what is within reach now is found without them as well.
+TEST(FieldContacts, PartingPlanesLeaveOutNothingWithinReach) {
+  const auto model = testing::wavy_model(bar(), 8);
+  TwoWays a(model), b(model);
+  Random random(31);
+  FieldContacts finder;
+  std::size_t found = 0, parted = 0;
+  for (int i = 0; i < 60; ++i) {
+    a.place(random.pose(0.06), random.amplitudes(8, 0.003)), b.place(random.pose(0.06), random.amplitudes(8, 0.003));
+    const RigidTransform here = between(a, b);
+    const RigidTransform moved{quaternion_from_rotation_vector(random.vector(0.1)), random.vector(0.01)};
+    const internal::FieldMotion motion{here, moved * here, random.vector(0.003)};
+    std::set<std::uint64_t> ids[2];
+    for (const int looks : {0, 8}) {
+      internal::collision_tuning_in_use.field.looks_apart = looks;
+      for (const internal::FoundContact& c : finder.find(a.field(), b.field(), motion, 2e-3))
+        if (c.gap <= 2e-3) ids[looks > 0 ? 1 : 0].insert(c.id());
+    }
+    EXPECT_EQ(ids[0], ids[1]);
+    found += ids[0].size(), parted += ids[0].empty() ? 1 : 0;
+  }
+  EXPECT_GT(found, 100u);
+  EXPECT_GT(parted, 5u);
+}
+
 // Two bars laid across each other without a vertex in the other: their edges carry them.
 TEST(FieldContacts, BarsAcrossEachOtherRestOnTheirEdges) {
   const auto bar_model =

@@ -49,10 +49,7 @@ bool lies_behind(const DeformedPointshell& body, Index t, const Vec3f& p, const 
 }  // namespace
 
 Vec3f expected_motion(const FieldView& view, Index vertex, const SurfaceFoothold& foot) {
-  const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> turning(&view.query.turn[0][0]);
-  Vec3f motion = turning * view.mine->vertex(vertex) +
-                 Vec3f(view.query.shift[0], view.query.shift[1], view.query.shift[2]) +
-                 view.turn * view.mine->swing(vertex);
+  Vec3f motion = view.motion(vertex);
   const Triangle& t = view.other->shell().surface().triangle(foot.triangle);
   for (std::size_t c = 0; c < 3; ++c)
     if (foot.weight[c] != 0.0f) motion -= foot.weight[c] * view.other->swing(t[c]);

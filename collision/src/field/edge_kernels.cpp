@@ -204,7 +204,7 @@ class EdgeBlock {
 };
 
 // Distances change by no more than the way: an edge whose ends stay clear of the surface by more than its length
-// together does not reach it, from neither side. A bit each.
+// together does not reach it, from neither side. Nor does one whose ends stay above the other's plane. A bit each.
 // @param longest no edge of these is longer, now
 HWY_INLINE HWY_ATTR unsigned MayReach(const FieldQuery& query, const ShellView& shell, const SampleBounds& bounds,
                                       I from, I to, float longest) {
@@ -212,13 +212,18 @@ HWY_INLINE HWY_ATTR unsigned MayReach(const FieldQuery& query, const ShellView& 
   const F clear = hn::Add(hn::GatherIndex(d, bounds.clear, from), hn::GatherIndex(d, bounds.clear, to));
   const F over = hn::Sub(clear, All(2.0f * query.reach));
   if (hn::AllFalse(d, hn::Le(over, All(longest + 2.0f * query.swing)))) return 0;
-  const Points across = Difference(GatherSamples(shell.coordinates, to), GatherSamples(shell.coordinates, from));
+  const Points a = GatherSamples(shell.coordinates, from), b = GatherSamples(shell.coordinates, to);
+  const Points across = Difference(b, a);
+  Heights at_a = HeightsOf(query.above, a), at_b = HeightsOf(query.above, b);
   F squared = Dot(across, across);
   if (shell.swings != nullptr) {
-    const Points then = Added(across, Difference(GatherSamples(shell.swings, to), GatherSamples(shell.swings, from)));
+    const Points swing_a = GatherSamples(shell.swings, from), swing_b = GatherSamples(shell.swings, to);
+    const Points then = Added(across, Difference(swing_b, swing_a));
     squared = hn::Max(squared, Dot(then, then));
+    at_a = HeightsOf(query.above, a, swing_a), at_b = HeightsOf(query.above, b, swing_b);
   }
-  return Bits(hn::Or(hn::Le(over, hn::Zero(d)), hn::Le(hn::Mul(over, over), squared)));
+  const auto low = hn::Le(hn::Min(Lower(at_a), Lower(at_b)), hn::Add(All(query.reach), Strays(query)));
+  return Bits(hn::And(low, hn::Or(hn::Le(over, hn::Zero(d)), hn::Le(hn::Mul(over, over), squared))));
 }
 
 HWY_ATTR std::size_t NearEdges(const FieldQuery& query, const ShellView& shell, const SampleBounds& bounds,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <variant>
 
+#include "field/parting_plane.h"
 #include "limber/core/quaternion.h"
 
 namespace limber::internal {
@@ -194,7 +195,7 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   if (view_[0].apart()) return;
   view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, motion_.fall,
                  comes_near(0) + slack * a.shell->shell().cell());
-  if (view_[1].apart()) return;
+  if (view_[1].apart() || part(view_[0], view_[1], static_cast<float>(reach_))) return;
   edges_.begin(view_[0], view_[1], static_cast<float>(reach_), static_cast<float>(motion_.passed));
   SampleBounds bounds[2];
   for (int of = 0; of < 2; ++of) {

@@ -77,6 +77,22 @@ HWY_INLINE HWY_ATTR Points Carried(const FieldQuery& q, const Points& v) {
   return Rotated(q.turn, v, {All(q.shift[0]), All(q.shift[1]), All(q.shift[2])});
 }
 
+// Of points that do not swing.
+struct Heights {
+  F now, then;
+};
+HWY_INLINE HWY_ATTR Heights HeightsOf(const HeightView& h, const Points& x) {
+  const auto height = [&](const float(&n)[3], float base) HWY_ATTR {
+    return hn::MulAdd(All(n[0]), x.x, hn::MulAdd(All(n[1]), x.y, hn::MulAdd(All(n[2]), x.z, All(base))));
+  };
+  return {height(h.now, h.base[0]), height(h.then, h.base[1])};
+}
+HWY_INLINE HWY_ATTR Heights HeightsOf(const HeightView& h, const Points& x, const Points& swing) {
+  const Heights at = HeightsOf(h, x);
+  return {at.now, hn::Add(at.then, Dot({All(h.now[0]), All(h.now[1]), All(h.now[2])}, swing))};
+}
+HWY_INLINE HWY_ATTR F Lower(const Heights& heights) { return hn::Min(heights.now, heights.then); }
+
 struct Cell {
   I node;
   F x, y, z;  // within it, 0 to 1

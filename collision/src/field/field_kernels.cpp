@@ -32,7 +32,7 @@ HWY_ATTR std::size_t NearClusters(const FieldQuery& query, const ClusterView& cl
       const F radius = hn::LoadU(d, clusters.radii + g * kFieldLanes + lane);
       const auto used = hn::Ge(radius, hn::Zero(d));
       const F spread = hn::MulAdd(All(1.0f + query.turning), radius, others);
-      F clear = hn::Sub(BeyondBox(query, q, way), spread);
+      F clear = hn::Sub(hn::Max(BeyondBox(query, q, way), Lower(HeightsOf(query.above, centre))), spread);
       if (!hn::AllFalse(d, hn::And(used, hn::Le(clear, reach)))) {
         const Points r = CarriedBack(query.lattice, q);
         clear = hn::Max(clear, hn::Sub(ClearOnTheWay(query, DistanceOf(query.field, r).value, r, way), spread));
@@ -65,8 +65,12 @@ HWY_ATTR std::size_t NearSamples(const FieldQuery& query, const ShellView& shell
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
       const Points x = LoadCluster(shell.coordinates + cluster * kClusterFloats, lane), q = Placed(query, x);
       Points way = Carried(query, x);
-      if (shell.swings != nullptr)
-        way = Rotated(query.R, LoadCluster(shell.swings + cluster * kClusterFloats, lane), way);
+      Heights above = HeightsOf(query.above, x);
+      if (shell.swings != nullptr) {
+        const Points swing = LoadCluster(shell.swings + cluster * kClusterFloats, lane);
+        way = Rotated(query.R, swing, way);
+        above = HeightsOf(query.above, x, swing);
+      }
       const auto keep_bounds = [&](F least, F clear, const Points& slope) HWY_ATTR {
         if (bounds.distance == nullptr) return;
         hn::StoreU(least, d, bounds.distance + cluster * kFieldLanes + lane);
@@ -74,7 +78,7 @@ HWY_ATTR std::size_t NearSamples(const FieldQuery& query, const ShellView& shell
                    bounds.clear + cluster * kFieldLanes + lane);
         StoreCluster(slope, bounds.slope + cluster * kClusterFloats, lane);
       };
-      const F beyond = hn::Sub(BeyondBox(query, q, way), Strays(query));
+      const F beyond = hn::Sub(hn::Max(BeyondBox(query, q, way), Lower(above)), Strays(query));
       if (hn::AllFalse(d, hn::Le(beyond, reach))) {
         const F unknown = All(std::numeric_limits<float>::quiet_NaN());
         keep_bounds(beyond, beyond, {unknown, unknown, unknown});
@@ -163,6 +167,42 @@ HWY_ATTR void LargestMagnitudes(const float* points, std::size_t count, float* l
   for (std::size_t i = whole; i < numbers; ++i) largest[i % 3] = std::max(largest[i % 3], std::abs(points[i]));
 }
 
+HWY_ATTR LowestSamples Lowest(const ShellView& shell, const HeightView& heights) {
+  const Floats d;
+  const Ints i;
+  HWY_ALIGN float height[2][kFieldLanes];
+  HWY_ALIGN std::int32_t cluster[2][kFieldLanes];
+  for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
+    F least[2] = {All(std::numeric_limits<float>::infinity()), All(std::numeric_limits<float>::infinity())};
+    I at[2] = {hn::Zero(i), hn::Zero(i)};
+    for (std::size_t c = 0; c < shell.clusters; ++c) {
+      const std::size_t first = c * kClusterFloats;
+      const Points x = LoadCluster(shell.coordinates + first, lane);
+      const Heights h = shell.swings != nullptr ? HeightsOf(heights, x, LoadCluster(shell.swings + first, lane))
+                                                : HeightsOf(heights, x);
+      const auto keep = [&](F value, F& lowest, I& where) HWY_ATTR {
+        const auto lower = hn::Lt(value, lowest);
+        lowest = hn::IfThenElse(lower, value, lowest);
+        where = hn::IfThenElse(hn::RebindMask(i, lower), hn::Set(i, static_cast<std::int32_t>(c)), where);
+      };
+      keep(h.now, least[0], at[0]), keep(h.then, least[1], at[1]);
+    }
+    for (std::size_t end = 0; end < 2; ++end)
+      hn::Store(least[end], d, height[end] + lane), hn::Store(at[end], i, cluster[end] + lane);
+  }
+  LowestSamples lowest{};
+  for (std::size_t end = 0; end < 2; ++end) {
+    std::size_t best = 0;
+    for (std::size_t lane = 1; lane < kFieldLanes; ++lane)
+      if (height[end][lane] < height[end][best] ||
+          (height[end][lane] == height[end][best] && cluster[end][lane] < cluster[end][best]))
+        best = lane;
+    lowest.height[end] = height[end][best];
+    lowest.sample[end] = cluster[end][best] * static_cast<std::int32_t>(kFieldLanes) + static_cast<std::int32_t>(best);
+  }
+  return lowest;
+}
+
 HWY_ATTR void BoxOfClusters(const ClusterView& clusters, float* low, float* high) {
   const Floats d;
   const F far = All(3e38f);
@@ -193,6 +233,7 @@ namespace limber::internal {
 HWY_EXPORT(MultiplyRows);
 HWY_EXPORT(LargestLength);
 HWY_EXPORT(LargestMagnitudes);
+HWY_EXPORT(Lowest);
 HWY_EXPORT(BoxOfClusters);
 HWY_EXPORT(NearClusters);
 HWY_EXPORT(NearSamples);
@@ -209,6 +250,10 @@ float largest_length(const float* clusters, std::size_t count) {
 
 void largest_magnitudes(const float* points, std::size_t count, float largest[3]) {
   HWY_DYNAMIC_DISPATCH(LargestMagnitudes)(points, count, largest);
+}
+
+LowestSamples lowest_samples(const ShellView& shell, const HeightView& heights) {
+  return HWY_DYNAMIC_DISPATCH(Lowest)(shell, heights);
 }
 
 void box_of_clusters(const ClusterView& clusters, float low[3], float high[3]) {

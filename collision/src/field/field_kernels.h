@@ -46,6 +46,13 @@ struct LatticeView {
   int steps = 0;                 ///< of r ← q − u(r), which carries a point back into the rest shape
 };
 
+/// Heights of points of a surface above a plane: now · x + base[0], and where they are expected at the step's end,
+/// swung by u, then · x + now · u + base[1].
+struct HeightView {
+  float now[3] = {}, then[3] = {};
+  float base[2] = {-3e38f, -3e38f};
+};
+
 /// What distances are asked of: a field and how the points lie in its frame, q = R x + p.
 struct FieldQuery {
   DistanceView field{};
@@ -63,6 +70,9 @@ struct FieldQuery {
   float curve = 0.0f;    ///< m: what turns strays no farther from the straight way
   float swing = 0.0f;    ///< m: no |u| is larger
   float fall[3] = {};    ///< or so much farther or less, in the field's frame
+  /// The other surface stays below. What stays higher than `reach` and all that points may stray is out of reach:
+  /// heights are exact, and begin above the plane by what these have for errors of the field and a fall aside.
+  HeightView above{};
 };
 
 /// Clusters of eight in one state: balls that hold them.
@@ -76,6 +86,7 @@ struct ClusterView {
 struct ShellView {
   const float* coordinates = nullptr;  ///< of samples, by cluster
   const float* swings = nullptr;       ///< how modes are expected to move these, m; null: they do not
+  std::size_t clusters = 0;            ///< of samples
   ClusterView samples{}, edges{};
   /// Per cluster of edges, the samples at their first eight ends, then at their second. Sample s is lane s mod 8 of
   /// cluster s div 8.
@@ -118,6 +129,13 @@ float largest_length(const float* clusters, std::size_t count);
 
 /// The largest |v| of each axis over `count` points xyz xyz …
 void largest_magnitudes(const float* points, std::size_t count, float largest[3]);
+
+/// The lowest samples of a surface, now and at the step's end; the first of those that are as low.
+struct LowestSamples {
+  float height[2];
+  std::int32_t sample[2];
+};
+LowestSamples lowest_samples(const ShellView& shell, const HeightView& heights);
 
 /// Box about balls about the clusters' centres. @param radii as many as lanes of `groups`; negative: none
 void box_of_clusters(const ClusterView& clusters, float low[3], float high[3]);

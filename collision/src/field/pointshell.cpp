@@ -279,8 +279,12 @@ ShellView DeformedPointshell::view() const {
   const auto clusters = [&](const Pointshell::Clusters& of) {
     return ClusterView{coordinates_ + of.centres, radii + of.radii, of.groups};
   };
-  return {coordinates_, swings_about_ ? swings_.data() : nullptr, clusters(s.sample_clusters_),
-          clusters(s.edge_clusters_), s.edge_ends_.data()};
+  return {coordinates_,
+          swings_about_ ? swings_.data() : nullptr,
+          s.sample_clusters_.count,
+          clusters(s.sample_clusters_),
+          clusters(s.edge_clusters_),
+          s.edge_ends_.data()};
 }
 
 LatticeView DeformedPointshell::lattice() const {
