@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "asked.h"
 #include "example_model.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
@@ -304,14 +305,15 @@ TEST(AssetReader, AChangedByteAnywhereIsRefusedOrChangesNothingThatIsRead) {
   const std::size_t binary = bytes.size() - glb_chunks(bytes, "test").binary.size();
   std::mt19937 random(7);
   int accepted = 0;
-  for (int n = 0; n < 1500; ++n) {
+  for (int n = 0; n < testing::all_or_tenth(1500); ++n) {
     std::string changed = bytes;
     changed[random() % binary] = static_cast<char>(random());
     if (reading(changed) != "accepted") continue;
     ++accepted;
     expect_same_bytes(asset_bytes(asset_from_bytes(changed, "test")), bytes);
   }
-  EXPECT_LT(accepted, 900);  // names of scenes, materials and the like, and bytes that were the same already
+  // Names of scenes, materials and the like, and bytes that were the same already.
+  EXPECT_LT(accepted, testing::all_or_tenth(900));
 }
 
 TEST(AssetReader, AnyValueOfTheDocumentMayBeAnyOtherWithoutHarm) {
@@ -343,7 +345,7 @@ TEST(AssetReader, AnyValueOfTheDocumentMayBeAnyOtherWithoutHarm) {
                                  {{"LIMBER_modal", 1}}};
   std::mt19937 random(3);
   int refused = 0;
-  constexpr int kTries = 1000;
+  constexpr int kTries = testing::all_or_tenth(1000);
   for (int n = 0; n < kTries; ++n) {
     json document = original;
     document[json::json_pointer(places[random() % places.size()])] = others[random() % others.size()];
