@@ -8,10 +8,12 @@
 
 #include "block_model.h"
 #include "limber/core/error.h"
+#include "limber/model/modal_model.h"
 #include "limber/scene/blows.h"
 #include "limber/sound/contact_time.h"
 #include "limber/sound/radiation.h"
 #include "limber/sound/synthesizer.h"
+#include "thread_jobs.h"
 
 namespace limber {
 namespace {
@@ -107,6 +109,82 @@ TEST(Soundtrack, BodiesWithoutASoundAreToldAndSilent) {
   EXPECT_EQ(track.silent_bodies, 1);
   EXPECT_EQ(track.blows, 0);
   EXPECT_EQ(track.loudest, 0.0);
+}
+
+RunResult play_slide(const Scene& scene, const std::map<std::string, Asset>& assets, Jobs* jobs = nullptr) {
+  RunResult run =
+      run_scene(scene, make_models(scene, assets), {.keep_contacts = true, .keep_blows = true, .jobs = jobs});
+  std::erase_if(run.trajectory.blows, [](const BlowRecord& b) { return b.other != BlowRecord::kNobody; });
+  return run;
+}
+
+double loudest_step(const Soundtrack& track, double from, double to) {
+  const auto frame = [&](double time) { return static_cast<std::size_t>(time * track.sample_rate); };
+  const auto channels = static_cast<std::size_t>(track.channels);
+  const std::size_t end = std::min(frame(to), track.samples.size() / channels);
+  float most = 0.0f;
+  for (std::size_t n = frame(from) + 1; n < end; ++n)
+    most = std::max(most, std::abs(track.samples[n * channels] - track.samples[(n - 1) * channels]));
+  return static_cast<double>(most);
+}
+
+constexpr const char* kSlidingBlock = R"("step": 0.005, "steps": 100, "contact": {"friction": 0.5},
+    "statics": [{"name": "ground", "shape": {"half_space": {}}}],
+    "bodies": [{"name": "b", "asset": "block", "position": [0, 0, 0.5], "velocity": [1.5, 0, 0]}])";
+
+/// A block that slides on the ground is braked by μ g. Each contact meets a roughness after the other, as often as its
+/// speed says; together they give the block its share of the energy that friction takes, and none at rest.
+TEST(Soundtrack, ABlockThatSlidesRubsUntilItRests) {
+  const auto assets = sounding_block();
+  constexpr double kSpeed = 1.5, kBrake = 0.5 * 9.80665, kRest = kSpeed / kBrake, kEnd = 0.8 * kRest;
+  const Scene scene = heard_scene(kSlidingBlock);
+  const RunResult run = play_slide(scene, assets);
+  double expected = 0.0;
+  for (const ContactRecord& contact : run.trajectory.contacts)
+    if (contact.phase == ContactPhase::kLasting && contact.time <= kEnd)
+      expected += (kSpeed - kBrake * contact.time) * scene.step / kRoughness;
+  const ModalModelData& block = assets.at("block").bodies[0]->data();
+  double count = 0.0, sum = 0.0, squares = 0.0, energy = 0.0;
+  for (const BlowRecord& blow : run.trajectory.blows) {
+    EXPECT_LT(blow.time, kRest + 2.0 * scene.step);
+    if (blow.time > kEnd) continue;
+    EXPECT_NEAR(kRoughness / blow.contact_time, kSpeed - kBrake * blow.time, 2.0 * kBrake * scene.step) << blow.time;
+    EXPECT_NEAR(blow.impulse.z(), 0.0, 1e-9);
+    const Vec3 turned = block.inertia.inverse() * blow.point.cross(blow.impulse);
+    ++count, sum += blow.impulse.x(), squares += blow.impulse.squaredNorm();
+    energy += 0.5 * (blow.impulse.squaredNorm() / block.mass + blow.point.cross(blow.impulse).dot(turned));
+  }
+  ASSERT_GT(expected, 500.0);
+  EXPECT_NEAR(count, expected, 0.05 * expected);
+  EXPECT_LT(std::abs(sum), 4.0 * std::sqrt(squares)) << "blows in both directions";
+  const double lost = 0.5 * block.mass * (kSpeed * kSpeed - std::pow(kSpeed - kBrake * kEnd, 2));
+  EXPECT_NEAR(energy, kShareOfFriction * lost, 0.15 * kShareOfFriction * lost);
+
+  const Soundtrack track = make_soundtrack(scene, assets, run);
+  const double sliding = loudest_step(track, 0.0, kEnd);
+  EXPECT_GT(sliding, 0.0);
+  EXPECT_LT(loudest_step(track, kEnd, 100.0), sliding) << "no click as the block sticks";
+  EXPECT_LT(std::abs(track.samples.back()), 20e-6);
+}
+
+TEST(Soundtrack, ABlockThatRestsOrRidesOnABeltIsSilent) {
+  const auto assets = sounding_block();
+  for (const std::string belt : {"0", "1.5"}) {
+    const Scene scene = heard_scene(R"("step": 0.005, "steps": 40,
+      "statics": [{"name": "ground", "shape": {"half_space": {}}, "surface_velocity": [)" +
+                                    belt + R"(, 0, 0]}],
+      "bodies": [{"name": "b", "asset": "block", "position": [0, 0, 0.5], "velocity": [)" +
+                                    belt + R"(, 0, 0]}])");
+    EXPECT_EQ(play_slide(scene, assets).trajectory.blows.size(), 0u) << belt;
+  }
+}
+
+TEST(Soundtrack, RubbingHasTheSameBitsForAnyNumberOfThreads) {
+  const auto assets = sounding_block();
+  const Scene scene = heard_scene(kSlidingBlock);
+  testing::ThreadJobs jobs(3);
+  EXPECT_TRUE(make_soundtrack(scene, assets, play_slide(scene, assets)).samples ==
+              make_soundtrack(scene, assets, play_slide(scene, assets, &jobs)).samples);
 }
 
 /// By the synthesizer itself, at every vertex; along y, as all modes bend.

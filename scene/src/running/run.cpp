@@ -65,7 +65,7 @@ class Run {
       note_joints();
       note_contacts(n);
       note_sensors(n);
-      if (options_.keep_blows) list_blows(scene_, player_, ids_, number_of_, result_.trajectory.blows);
+      note_blows();
       note_sleepers();
       if (options_.reconstruct_every_step) reconstruct_all();
       if ((n + 1) % stride_ == 0 || n + 1 == steps_) keep_key(n + 1);
@@ -74,6 +74,12 @@ class Run {
   }
 
  private:
+  void note_blows() {
+    if (!options_.keep_blows) return;
+    list_blows(scene_, player_, ids_, number_of_, result_.trajectory.blows);
+    list_slides(scene_, player_, ids_, number_of_, result_.trajectory.blows);
+  }
+
   /// Contacts tell bodies by the indices of their ids; sensors have numbers of their own.
   void number_bodies() {
     const auto number = [&](BodyId id, std::size_t in_trajectory) {

@@ -17,15 +17,21 @@
 
 namespace limber {
 
-/// Something that struck a body: a strike of the scene, or a contact that began with an approach.
+/// Between the roughnesses of a surface, along the way that a contact slides; m.
+inline constexpr double kRoughness = 5e-4;
+/// Of the work of friction, what becomes vibration.
+inline constexpr double kShareOfFriction = 1e-3;
+
+/// Something that struck a body: a strike of the scene, a contact that began with an approach, or a roughness that a
+/// contact slid over.
 struct BlowRecord {
   static constexpr std::size_t kNobody = ~std::size_t{0};
   double time = 0.0;             ///< s: of the strike, or of the start of the step in which the contact began
   std::size_t body = 0;          ///< which was struck, of Trajectory::bodies
-  std::size_t other = kNobody;   ///< which struck it, as ContactRecord numbers them; kNobody: a strike of the scene
+  std::size_t other = kNobody;   ///< which struck it, as ContactRecord numbers them; kNobody: not by a collision
   Vec3 position = Vec3::Zero();  ///< world, m
   Vec3 point = Vec3::Zero(), impulse = Vec3::Zero();  ///< the place and the impulse on the body, body frame, m and N·s
-  double contact_time = 0.0;                          ///< of a strike of the scene, s
+  double contact_time = 0.0;                          ///< of what is no collision, s
   /// Of a contact, of both bodies together as contact_time.h has them: m, kg, R, m, and v, m/s. A body without a radius
   /// of its own (ContactSide) counts as a ball of its volume, a static as flat.
   double mass = kUnbounded, radius = kUnbounded, approach = 0.0;
@@ -36,6 +42,16 @@ struct BlowRecord {
 /// @param number_of by BodyId::index the number of a body, of a static one bodies.size() or more
 void list_blows(const Scene& scene, const ScenePlayer& player, std::span<const BodyId> bodies,
                 std::span<const std::size_t> number_of, std::vector<BlowRecord>& blows);
+
+/// Appends the noise of friction of the step that `player` took last: a contact that lasts and slides at speed v under
+/// the friction f meets v/d roughnesses a second, of distance d = kRoughness. Each is a blow on both bodies along f, of
+/// the duration d/v and the impulse J = √(2 m η f d) times a number of mean 0 and variance 1, even between ±√3: it
+/// gives the mass m that the contact feels along f the share η = kShareOfFriction of the work f d. So the power of the
+/// noise follows that of friction, f v, and its highest frequency v/d follows the speed [van den Doel, Kry and Pai,
+/// FoleyAutomatic, 2001]. Numbers come from the contact and the step: the same whenever it is played.
+/// @param bodies, number_of as for list_blows(); of the scene's static i, bodies.size() + i
+void list_slides(const Scene& scene, const ScenePlayer& player, std::span<const BodyId> bodies,
+                 std::span<const std::size_t> number_of, std::vector<BlowRecord>& blows);
 
 /// A kind of body as one hears it.
 class SoundingBody {

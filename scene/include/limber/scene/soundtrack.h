@@ -5,7 +5,7 @@
 /// at the nearest point of the surface that touches. A blow of a contact lasts as long as Hertz's collision of the two
 /// bodies (limber/sound/contact_time.h); those without a sound are rigid in it. Each microphone hears p = g q̇/r
 /// (limber/sound/radiation.h) with its distance r from the last blow, no less than the radius of the ball that has the
-/// body's surface. Directions, walls and the time that sound takes are left out; bodies that slide or roll are silent.
+/// body's surface. Directions, walls and the time that sound takes are left out; bodies that roll are silent.
 #pragma once
 
 #include <cstdint>
