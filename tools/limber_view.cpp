@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments {
-  std::string input, page, joints, up = "z";
+  std::string input, page, joints, up;
   std::vector<std::string> bake;
 };
 
@@ -81,9 +81,21 @@ std::string neighbour(const char* name) {
   return !failed && fs::exists(beside, failed) ? beside.string() : name;
 }
 
+/// As asked, or else as the file of a mesh says; z where it does not.
+UpAxis up_axis(const std::string& asked, char of_file) {
+  return (asked.empty() ? of_file == 'y' : asked == "y") ? UpAxis::kY : UpAxis::kZ;
+}
+
+char up_axis_of_file(const fs::path& mesh) {
+  Warnings told_by_the_bake;
+  FileUnit unit;
+  (void)read_any_grouped_surface(mesh, told_by_the_bake, &unit);
+  return unit.up;
+}
+
 /// An assembly: its joints are found and its parts baked by limber-precompute, a program of its own because of the
 /// licences of what it links.
-PageContent page_of_assembly(const fs::path& input, const std::vector<std::string>& bake) {
+PageContent page_of_assembly(const fs::path& input, const std::string& up, const std::vector<std::string>& bake) {
   const ScratchFolder folder;
   const fs::path asset = folder.path / (input.stem().string() + ".glb");
   std::vector<std::string> arguments{input.string(), "-o", asset.string()};
@@ -106,7 +118,7 @@ PageContent page_of_assembly(const fs::path& input, const std::vector<std::strin
   if (*code != 0)
     throw InputError(
         fmt::format("{}: limber-precompute could not bake it (see above); its options go after --", input.string()));
-  return page_of_asset(asset);
+  return page_of_asset(asset, up_axis(up, up_axis_of_file(input)));
 }
 
 PageContent content_of(Program& program, const Arguments& arguments) {
@@ -118,10 +130,9 @@ PageContent content_of(Program& program, const Arguments& arguments) {
                         input.stem().string(), "\"" + fs::path(arguments.joints).filename().string() + "\"");
   }
   if (extension == ".json") return page_of_scene(input);
-  if (extension == ".glb" && arguments.bake.empty())
-    return page_of_asset(input, arguments.up == "y" ? UpAxis::kY : UpAxis::kZ);
+  if (extension == ".glb" && arguments.bake.empty()) return page_of_asset(input, up_axis(arguments.up, 0));
   if (!fs::exists(input)) throw InputError(input.string() + ": is not there");
-  return page_of_assembly(input, arguments.bake);
+  return page_of_assembly(input, arguments.up, arguments.bake);
 }
 
 /// gzip's bytes (RFC 1952), which every browser reads.
@@ -191,8 +202,9 @@ int main(int argc, char** argv) {
                   "joints file of a surface: a page in which it is posed, and its joints edited")
       ->type_name("JOINTS.json");
   program.options()
-      .add_option("--up", arguments.up, "of an asset: the axis of its mesh that points up")
-      ->check(CLI::IsMember({"y", "z"}))
-      ->capture_default_str();
+      .add_option("--up", arguments.up,
+                  "of an asset or assembly: the axis of its mesh that points up; by default what an assembly's file "
+                  "says, else z")
+      ->check(CLI::IsMember({"y", "z"}));
   return program.run(argc, argv, [&] { limber::tools::view(program, arguments); });
 }

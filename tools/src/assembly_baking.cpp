@@ -17,6 +17,7 @@
 #include "limber/mesh/mend_surface.h"
 #include "limber/mesh_assimp/read_surface_mesh.h"
 #include "limber/scene/scene_model.h"
+#include "precompute_input.h"
 
 namespace limber::tools {
 namespace {
@@ -285,7 +286,9 @@ std::vector<AttachmentPatch> patches_on(Index part, const Joined& joined, double
 
 BakedAssembly bake_assembly(Program& program, const std::string& path, const AssemblyOptions& options,
                             const BakeOptions& bake_options, Jobs& jobs) {
-  const GroupedSurface surface = read_any_grouped_surface(path, program.warnings());
+  FileUnit unit;
+  const GroupedSurface surface = read_any_grouped_surface(path, program.warnings(), &unit);
+  tell_unit(program, unit);
   Joined joined =
       options.joints_file.empty()
           ? detect(program, surface, options.components, jobs)

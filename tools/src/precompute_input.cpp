@@ -183,14 +183,6 @@ void join_parts(Program& program, const PrecomputeArguments& a, TetMesh& mesh) {
         name, touching, touch));
 }
 
-/// Tells which unit of the file counts.
-void tell_unit(Program& program, const FileUnit& unit) {
-  nlohmann::ordered_json& told = program.report()["unit"];
-  told = {{"metres", unit.metres}, {"stated", unit.stated}, {"up", nullptr}};
-  if (unit.up != 0) told["up"] = std::string(1, unit.up);
-  if (unit.metres != 1.0) program.print(fmt::format("lengths: the file's unit is {:.6g} m\n", unit.metres));
-}
-
 /// Whether materials are told by names of faces.
 bool asks_for_faces(const BakeOptions& bake) {
   return std::ranges::any_of(bake.materials, [](const auto& entry) { return entry.first != "*"; }) ||
@@ -214,6 +206,13 @@ void read_named_faces(const PrecomputeArguments& a, const AskedBake& asked, Bake
 }
 
 }  // namespace
+
+void tell_unit(Program& program, const FileUnit& unit) {
+  nlohmann::ordered_json& told = program.report()["unit"];
+  told = {{"metres", unit.metres}, {"stated", unit.stated}, {"up", nullptr}};
+  if (unit.up != 0) told["up"] = std::string(1, unit.up);
+  if (unit.metres != 1.0) program.print(fmt::format("lengths: the file's unit is {:.6g} m\n", unit.metres));
+}
 
 BakeInput read_input(Program& program, const PrecomputeArguments& a, const AskedBake& asked, Stopwatch& stopwatch) {
   BakeInput input;

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "limber/mesh_assimp/file_unit.h"
 #include "precompute_arguments.h"
 #include "program.h"
 
@@ -26,6 +27,9 @@ class Stopwatch {
  private:
   nlohmann::ordered_json& seconds_;
 };
+
+/// Tells which unit of the file counts.
+void tell_unit(Program& program, const FileUnit& unit);
 
 /// @param asked what --frequency-error bakes its tries with, and what materials want of the surface. The report gets
 /// `surface`, `unit` and `merged_nodes`.
