@@ -6,6 +6,8 @@ function(limber_compile_options target)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast
                                            -Woverloaded-virtual -Wunused)
+  # Sources compiled together are included by their whole path: without the clone's part of it in __FILE__, clones share the results.
+  target_compile_options(${target} PRIVATE -fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
     # GCC 12 sees an overlap in every optimised `"text" + string` (its bug 105651).
     target_compile_options(${target} PRIVATE -Wno-restrict)
@@ -137,9 +139,7 @@ function(limber_add_tests module)
   set_target_properties(test_${module} PROPERTIES
     RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests" UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${batch})
   target_link_libraries(test_${module} PRIVATE ${arg_LINK} GTest::gmock GTest::gtest_main)
-  target_include_directories(test_${module} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support)
-  target_compile_definitions(test_${module} PRIVATE
-    LIMBER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" LIMBER_BIN_DIR="${PROJECT_BINARY_DIR}/bin")
+  target_include_directories(test_${module} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support ${PROJECT_BINARY_DIR}/tests/support)
   limber_compile_options(test_${module})
   target_compile_options(test_${module} PRIVATE ${LIMBER_CALLER_OPTIONS})
   limber_sanitize(test_${module})

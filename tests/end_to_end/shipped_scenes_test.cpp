@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "constants.h"
+#include "folders.h"
 #include "limber/precompute/bake.h"
 #include "limber/scene/run.h"
 #include "tet_box.h"

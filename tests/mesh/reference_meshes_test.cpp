@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "folders.h"
 #include "mesh_files.h"
 
 namespace limber {

@@ -10,6 +10,7 @@
 #include <functional>
 
 #include "constants.h"
+#include "folders.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 

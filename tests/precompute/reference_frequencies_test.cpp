@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "folders.h"
 #include "limber/precompute/modal_analysis.h"
 #include "mesh_files.h"
 

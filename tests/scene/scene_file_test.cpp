@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "block_model.h"
+#include "folders.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 

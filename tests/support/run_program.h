@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "folders.h"
+
 namespace limber::testing {
 
 struct ProgramResult {

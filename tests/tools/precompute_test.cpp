@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "broken_meshes.h"
+#include "folders.h"
 #include "limber/core/file.h"
 #include "limber/model/asset.h"
 #include "mesh_files.h"

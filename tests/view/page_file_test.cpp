@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "block_model.h"
+#include "folders.h"
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/scene/scene_file.h"
