@@ -19,9 +19,10 @@ Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowParameter
 }
 
 Index ConstraintRows::add(const RowSide& a, const RowSide& b) {
+  static constexpr RowParameters kLaw;
   if (size() == static_cast<Index>(rows_.size())) rows_.emplace_back();
   Row& row = this->row(size_++);
-  row.law = {};
+  row.law = kLaw;
   const bool itself = a.body >= 0 && a.body == b.body;
   for (std::size_t s = 0; s < 2; ++s) {
     const RowSide& from = s == 0 ? a : b;

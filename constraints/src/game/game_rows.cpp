@@ -19,15 +19,15 @@ Eigen::Map<const Block<count>> block(const double* at) {
   return Eigen::Map<const Block<count>>(at);
 }
 
-/// x += Σ f row of a block.
+/// x += Σ f row of a block. @param next from row to row
 template <int count>
-void add_rows(const double* row, std::int32_t next, std::span<const double> forces, double* x) {
+inline void add_rows(const double* row, std::int32_t next, const double* forces, std::size_t rows, double* x) {
   Eigen::Map<Block<count>> to(x);
   std::size_t i = 0;
-  for (; i + 3 <= forces.size(); i += 3, row += 3 * next)  // those of a ball joint in one pass
+  for (; i + 3 <= rows; i += 3, row += 3 * next)  // those of a ball joint in one pass
     to += forces[i] * block<count>(row) + forces[i + 1] * block<count>(row + next) +
           forces[i + 2] * block<count>(row + 2 * next);
-  for (; i < forces.size(); ++i, row += next) to += forces[i] * block<count>(row);
+  for (; i < rows; ++i, row += next) to += forces[i] * block<count>(row);
 }
 
 }  // namespace
@@ -98,10 +98,13 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
     for (std::size_t i = 0; i < group.count; ++i, to += side.coordinates) {
       const ConstraintRows::Side& from = made_.row(static_cast<Index>(i)).sides[s];
       Eigen::Map<Vec3>{to} = shift.cwiseProduct(from.linear);
-      Eigen::Map<Vec3>{to + 3} = turn * from.angular;
-      const std::span<const double> modal = made_.modal(from);
-      for (std::size_t m = 0; m < modal.size(); ++m) to[8 + m] = modal[m] * static_cast<double>(body.modes->roots()[m]);
-      std::fill(to + 8 + modal.size(), to + side.coordinates, 0.0);
+      Eigen::Map<Vec3>{to + 3}.noalias() = turn * from.angular;
+      if (body.modes != nullptr) {
+        const std::span<const double> modal = made_.modal(from);
+        for (std::size_t m = 0; m < modal.size(); ++m)
+          to[8 + m] = modal[m] * static_cast<double>(body.modes->roots()[m]);
+        std::fill(to + 8 + modal.size(), to + side.coordinates, 0.0);
+      }
       if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
     }
     closing ? resist(body, group, s) : stiffen(body, group, s);
@@ -250,7 +253,7 @@ void GameRows::scale_pushes(std::span<const RowBody> at, const std::vector<Block
 }
 
 void GameRows::multiply(const GameGroup& group, std::span<const double> x, double* product) const {
-  std::fill_n(product, group.count, 0.0);
+  for (std::size_t i = 0; i < group.count; ++i) product[i] = 0.0;
   for (const GameSide& side : group.sides) {
     if (side.frame < 0) continue;
     const double *row = numbers(side, 0), *from = x.data() + 8 * side.body;
@@ -267,9 +270,9 @@ void GameRows::add_transposed(const GameGroup& group, const double* forces, std:
     if (side.frame < 0) continue;
     const double* row = numbers(side, 0);
     double* to = x.data() + 8 * side.body;
-    add_rows<6>(row, side.coordinates, {forces, group.count}, to);
+    add_rows<6>(row, side.coordinates, forces, group.count, to);
     for (std::int32_t k = 8; k < side.coordinates; k += 8)
-      add_rows<8>(row + k, side.coordinates, {forces, group.count}, to + k);
+      add_rows<8>(row + k, side.coordinates, forces, group.count, to + k);
   }
 }
 

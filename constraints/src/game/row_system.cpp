@@ -17,14 +17,20 @@ double dot(const double* a, const double* b, std::int32_t count) {
   return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-/// to += a bᵀ of three rows each, one after the other: of the lower part alone, if a is b.
+/// sum += a bᵀ of three rows each, of two coordinates: of the lower part alone, if a is b.
+template <bool lower>
+inline void add_pair_products(const double* a, const double* b, std::int32_t next, double (&sum)[3][3][2]) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < (lower ? i + 1 : 3); ++j)
+      for (int m = 0; m < 2; ++m) sum[i][j][m] += a[next * i + m] * b[next * j + m];
+}
+
+/// to += a bᵀ of three rows each, one after the other; of a frame's coordinates six are used.
 template <bool lower>
 void add_ball_products(const double* a, const double* b, std::int32_t coordinates, double* to) {
   double sum[3][3][2] = {};
-  for (std::int32_t k = 0; k < coordinates; k += 2)
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < (lower ? i + 1 : 3); ++j)
-        for (int m = 0; m < 2; ++m) sum[i][j][m] += a[coordinates * i + k + m] * b[coordinates * j + k + m];
+  for (std::int32_t k = 0; k < 6; k += 2) add_pair_products<lower>(a + k, b + k, coordinates, sum);
+  for (std::int32_t k = 8; k < coordinates; k += 2) add_pair_products<lower>(a + k, b + k, coordinates, sum);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < (lower ? i + 1 : 3); ++j) to[3 * i + j] += sum[i][j][0] + sum[i][j][1];
 }
