@@ -24,6 +24,7 @@ struct StepInParts {
   IslandReport report;  // of the parts taken
   double left = 0.0;    // s, with the part
   double length = 0.0;  // s, of a part, where the step is divided
+  double begun = 0.0;   // s, with what length that began
   bool divides = false, gives_up = false;
 };
 

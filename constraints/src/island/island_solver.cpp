@@ -22,6 +22,19 @@ bool may_divide(const StepPart& part) {
          has_no_dates(part);
 }
 
+/// s: the step, in halves until bodies turn little enough in one.
+double length_of_parts(const StepPart& part) {
+  double fastest = 0.0;
+  for (const Index member : part.members) {
+    const auto& [group, slot, pose] = part.table[static_cast<std::size_t>(member)];
+    fastest = std::max(fastest, group->frame(slot).angular_velocity(group->frame_constants()).norm());
+  }
+  const PartTuning& tuning = kConstraintsTuning.parts;
+  double length = part.whole_step;
+  while (fastest * length > tuning.most_turned && length > tuning.shortest_divided * part.whole_step) length *= 0.5;
+  return length;
+}
+
 StepPart whole_step(std::span<const ConstrainedBody> table, std::span<const Index> members,
                     std::span<Constraint* const> constraints, const IslandOptions& options) {
   return {.table = table,
@@ -39,8 +52,9 @@ IslandReport IslandParts::step(std::span<const ConstrainedBody> table, std::span
   StepInParts& at = parts_;
   at.part = whole_step(table, members, constraints, options);
   at.report = {.bodies = static_cast<int>(members.size())};
-  at.left = at.length = options.step;
+  at.left = options.step;
   at.divides = may_divide(at.part);
+  at.length = at.begun = length_of_parts(at.part);
   at.gives_up = false;
   begin_times(options.timed);
   for (;;) {
@@ -73,9 +87,8 @@ void IslandParts::find_cut() {
   parts_.done.attempts[StepAttempt::kCutAtTouch] = part.ends ? 0 : 1;
 }
 
-/// What is left, in halves, quarters and so on of the step from where the rows do not come together: impulses at a
-/// step's start bring joints together at its end only where bodies turn by less than a radian or so in between. Where
-/// the shortest part does not settle either, what is left is taken as it comes.
+/// What is left, in halves, quarters and so on of the step from where the rows do not come together. Where the shortest
+/// part does not settle either, what is left is taken as it comes.
 void IslandParts::find_divided() {
   StepPart& part = parts_.part;
   for (;; parts_.length *= 0.5) {
@@ -90,7 +103,7 @@ void IslandParts::find_divided() {
     parts_.gives_up = parts_.length <
                       kConstraintsTuning.parts.last_part * kConstraintsTuning.parts.shortest_divided * part.whole_step;
   }
-  parts_.done.attempts[StepAttempt::kDivided] = part.ends ? 0 : 1;
+  parts_.done.attempts[StepAttempt::kDivided] = !part.ends && parts_.length < parts_.begun ? 1 : 0;
 }
 
 /// Impulses and slip_, by row.
