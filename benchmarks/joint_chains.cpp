@@ -1,6 +1,6 @@
 // Joints at game quality (ContactSolver::kGame, 8 substeps, 60 steps a second): how long chains take, how far their
 // joints open, and what the energy does. Prints Markdown.
-// Usage: joint_chains [chains|ends|tops|figures|grid]
+// Usage: joint_chains [chains|ends|figures|grid]
 // Figures: docs/reports/joints.md.
 #include <algorithm>
 #include <cmath>
@@ -151,41 +151,6 @@ void ends() {
       }
 }
 
-/// A disc hangs by a ball joint a radius beside its middle, its axle level, and precesses by m g l/(I ω).
-void tops() {
-  constexpr double kRadius = 0.1, kArm = 0.1;
-  std::printf(
-      "| rad/s | precession after 2 s / law | height at its lowest / arm | energy after / before "
-      "|\n|---|---|---|---|\n");
-  for (const double spin : {30.0, 100.0, 300.0}) {
-    NoContacts none;
-    World world;
-    world.set_contact_source(&none, kGame);
-    ModalModelData d = sample_model_data({.modes = 0});
-    d.mass = 1.0;
-    const double axial = 0.5 * kRadius * kRadius, across = 0.25 * kRadius * kRadius;
-    d.inertia = Vec3(axial, across, across).asDiagonal();
-    const auto model = std::make_shared<const ModalModel>(std::move(d));
-    const double law = kGravity * kArm / (axial * spin);
-    const BodyId disc = world.add_body(
-        model,
-        {.pose = {{}, {kArm, 0.0, 0.0}}, .velocity = {0.0, law * kArm, 0.0}, .angular_velocity = {spin, 0.0, law}});
-    world.add_joint(BodyId{}, disc, {.type = JointType::kBall});
-    const double before = world.energy(disc).total();
-    double turned = 0.0, last = 0.0, low = 0.0;
-    for (int i = 0; i < 120; ++i) {
-      world.step();
-      const Vec3 p = world.body(disc).pose.p;
-      const double now = std::atan2(p.y(), p.x());
-      turned += std::remainder(now - last, 2.0 * std::numbers::pi);
-      last = now;
-      low = std::min(low, p.z());
-    }
-    std::printf("| %.0f | %.4f | %.3f | %.5f |\n", spin, turned / (2.0 * law), low / kArm,
-                world.energy(disc).total() / before);
-  }
-}
-
 /// Ten boxes as a figure: hinges at knees and elbows, balls with cones at hips, shoulders and neck. It falls turned at
 /// random.
 struct Figure : Chain {
@@ -325,11 +290,11 @@ void grid() {
 
 int run(const std::string& part) {
   const std::pair<const char*, void (*)()> parts[] = {
-      {"chains", chains}, {"ends", ends}, {"tops", tops}, {"figures", figures}, {"grid", grid}};
+      {"chains", chains}, {"ends", ends}, {"figures", figures}, {"grid", grid}};
   bool any = false;
   for (const auto& [name, print] : parts)
     if (part.empty() || part == name) any = true, print(), std::printf("\n");
-  if (!any) std::fprintf(stderr, "joint_chains: \"%s\", expected chains, ends, tops, figures or grid\n", part.c_str());
+  if (!any) std::fprintf(stderr, "joint_chains: \"%s\", expected chains, ends, figures or grid\n", part.c_str());
   return any ? 0 : 2;
 }
 
