@@ -80,7 +80,8 @@ void ContactOptions::validate() const {
 struct ContactSet::Impl {
   ContactOptions options;
   std::vector<PreparedContact> contacts;
-  std::vector<VertexShare> corners;  // of their sides
+  std::vector<VertexShare> corners;  // of their sides, as what follows
+  std::vector<Mat3> turns;
   ContactHistory history;
   std::vector<RollingMemory> rolling_memory;  // by (a, b), of the last step
   Pool<PairContacts> pairs;
@@ -91,7 +92,7 @@ struct ContactSet::Impl {
 
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
   void add(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around);
-  void add_corners(PreparedSide& side);
+  void add_corners(const BodyStates& states, PreparedSide& side);
 };
 
 void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around) {
@@ -104,8 +105,8 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   contact.id = point.id;
   make_side(states, point.a, point.normal, contact.a);
   make_side(states, point.b, -point.normal, contact.b);
-  add_corners(contact.a);
-  add_corners(contact.b);
+  add_corners(states, contact.a);
+  add_corners(states, contact.b);
   contact.axes = frame_along(point.normal);
   const double smaller = std::min(of_a.friction, of_b.friction);
   contact.friction = smaller > 0.0 ? std::sqrt(of_a.friction * of_b.friction) : 0.0;
@@ -124,13 +125,15 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
 }
 
 /// @pre there is room: spans of them stay where they are
-void ContactSet::Impl::add_corners(PreparedSide& side) {
+void ContactSet::Impl::add_corners(const BodyStates& states, PreparedSide& side) {
   if (!yields(side)) return;
   const std::size_t first = corners.size();
   const Triangle& vertices = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
   for (std::size_t c = 0; c < 3; ++c)
     if (side.at.weight[c] != 0.0) corners.push_back({.vertex = vertices[c], .share = side.at.weight[c]});
   side.corners = std::span(corners).subspan(first);
+  if (side.skin == nullptr) return;
+  side.turn = &turns.emplace_back(side.shape(states.amplitudes(side.body, StepTime::kStart)).turn(side.at));
 }
 
 ContactSet::ContactSet(const ContactOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -151,8 +154,9 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
     bodies = std::max(bodies, static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
   s.history.reserve(bodies);
   s.indentations.reserve(bodies);
-  s.corners.clear();
+  s.corners.clear(), s.turns.clear();
   s.corners.reserve(6 * points.size());  // three of each side
+  s.turns.reserve(2 * points.size());
   for (const ContactPoint& point : points)
     if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, surroundings);
   s.pairs.reuse(), s.rolling.reuse();

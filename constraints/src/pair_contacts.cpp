@@ -56,7 +56,7 @@ void PairContacts::add_rows(const BodyStates& states, StepTime when, double step
 void PairContacts::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
   const bool start = when == StepTime::kStart;
   visit_rows([&](const PreparedContact& contact, std::size_t row) {
-    const Vec3 apart = contact.apart(states, when), indentation = start ? contact.indentation : Vec3(Vec3::Zero());
+    const Vec3 apart = contact.apart(states, when), indentation = start ? indentation_of(contact) : Vec3(Vec3::Zero());
     gaps[row] = contact.axes.col(0).dot(apart) + indentation[0];
     if (contact.friction == 0.0) return;
     Vec3 slip = apart - contact.offset;
@@ -91,11 +91,12 @@ void PairContacts::begin(const BodyStates& states) {
   for (std::size_t i = 0; i < 2; ++i)
     if (yields_[i]) turn_[i] = states.pose(first.side(i).body, StepTime::kStart).q;
   for (PreparedContact& contact : contacts_)
-    for (PreparedSide* side : {&contact.a, &contact.b})
-      if (side->skin != nullptr)
-        side->turn = side->shape(states.amplitudes(side->body, StepTime::kStart)).turn(side->at);
+    for (const PreparedSide* side : {&contact.a, &contact.b})
+      if (side->turn != nullptr)
+        *side->turn = side->shape(states.amplitudes(side->body, StepTime::kStart)).turn(side->at);
   compliance_ = options_->compliance > 0.0 && flexes_ ? compliance(states) : 0.0;
-  for (PreparedContact& contact : contacts_) {
+  indentation_.clear();
+  for (const PreparedContact& contact : contacts_) {
     Vec3 indentation = Vec3::Zero();
     for (std::size_t i = 0; i < 2; ++i) {
       const PreparedSide& side = contact.side(i);
@@ -103,7 +104,7 @@ void PairContacts::begin(const BodyStates& states) {
         indentation += PreparedContact::sign(i) *
                        (turn_[i] * side.turned(indentations_->displacement(states, side.body, side.corners)));
     }
-    contact.indentation = contact.axes.transpose() * (indentation + contact.compliance * contact.last_force);
+    indentation_.push_back(contact.axes.transpose() * (indentation + contact.compliance * contact.last_force));
   }
   caught_ = flexes_ && is_caught();
 }
@@ -182,7 +183,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
     const Vec3 n = contact.axes.col(axis);
     RowParameters law{.tolerance = tolerance, .contact = true};
     if (axis == 0) {
-      const double gap = n.dot(a - b) + (when == StepTime::kStart ? contact.indentation[0] : 0.0);
+      const double gap = n.dot(a - b) + (when == StepTime::kStart ? indentation_of(contact)[0] : 0.0);
       const double recovery = caught_
                                   ? 0.0
                                   : std::min(internal::kConstraintsTuning.rows.overlap_recovery * std::max(0.0, -gap),
@@ -194,7 +195,7 @@ void PairContacts::add_contact(const BodyStates& states, StepTime when, const Pr
       law.friction = contact.friction;
       law.shift = contact.friction * contact.slip;
     } else {
-      law.offset = contact.indentation[axis];
+      law.offset = indentation_of(contact)[axis];
       law.slides = true;
       law.goes_on = true;
     }

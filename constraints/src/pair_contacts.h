@@ -41,6 +41,11 @@ class PairContacts final : public Constraint {
     }
   }
 
+  /// What the bodies yield at the step's start along a contact's axes, m.
+  const Vec3& indentation_of(const PreparedContact& contact) const {
+    return indentation_[static_cast<std::size_t>(&contact - contacts_.data())];
+  }
+
   /// What each contact yields by itself in the coming step, m/N.
   double compliance(const BodyStates& states) const;
 
@@ -63,6 +68,7 @@ class PairContacts final : public Constraint {
   std::array<Quaternion, 2> turn_{};  // of its body at the step's start, where it yields
   bool flexes_ = false, caught_ = false;
   double step_ = 0.0;
+  std::vector<Vec3> indentation_;             // by contact
   double compliance_ = 0.0;                   // of each contact of bodies that flex, m/N
   std::array<std::vector<double>, 2> modal_;  // scratch by side, as what follows
 };

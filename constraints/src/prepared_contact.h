@@ -40,8 +40,8 @@ struct PreparedSide {
   const ModalModel* model = nullptr;  // null: a rigid shape, or one that stands still
   SurfacePoint at{};
   std::span<const VertexShare> corners{};  // with a residual compliance: the vertices that the point lies between
+  Mat3* turn = nullptr;                    // of what they yield, at the step's start; null: the body has no skin
   SkinMemory* skin = nullptr;              // null: the body bends by its modes alone
-  Mat3 turn = Mat3::Identity();            // with a skin: of what it yields beyond its modes, at the step's start
   Vec3 rigid_point = Vec3::Zero();  // without a model: body frame; where the surface is that of a ball, its centre
   Vec3 rim = Vec3::Zero();          // from there to where it touches, world; as the normal it stays for the step
 
@@ -49,8 +49,8 @@ struct PreparedSide {
   BodyShape shape(std::span<const double> z) const { return {*model, z, skin}; }
 
   /// What the body yields beyond its modes, in its own axes, from that of the rest shape; and the other way, a force.
-  Vec3 turned(const Vec3& u) const { return skin == nullptr ? u : Vec3(turn * u); }
-  Vec3 turned_back(const Vec3& f) const { return skin == nullptr ? f : Vec3(turn.transpose() * f); }
+  Vec3 turned(const Vec3& u) const { return turn == nullptr ? u : Vec3(*turn * u); }
+  Vec3 turned_back(const Vec3& f) const { return turn == nullptr ? f : Vec3(turn->transpose() * f); }
 
   /// Where the body touches, at one of the step's ends.
   Vec3 position(const BodyStates& states, StepTime when) const {
@@ -90,12 +90,11 @@ struct PreparedContact {
   double approach = 0.0;        // m/s, as ContactEvent::approach
   Vec3 offset = Vec3::Zero();   // p_a − p_b at the step's start, world
   Vec3 start_position = Vec3::Zero();
-  Vec3 last_force = Vec3::Zero();   // world, on a, N
-  Vec3 mean_force = Vec3::Zero();   // the same over the step; of small steps alone
-  double compliance = 0.0;          // what the contact yielded to it by itself, m/N
-  double slip = 0.0;                // beyond what its spring gave, m
-  Vec3 indentation = Vec3::Zero();  // what the bodies yield at the step's start along the axes, m
-  Vec3 impulse = Vec3::Zero();      // of this step, world, on a
+  Vec3 last_force = Vec3::Zero();  // world, on a, N
+  Vec3 mean_force = Vec3::Zero();  // the same over the step; of small steps alone
+  double compliance = 0.0;         // what the contact yielded to it by itself, m/N
+  double slip = 0.0;               // beyond what its spring gave, m
+  Vec3 impulse = Vec3::Zero();     // of this step, world, on a
 
   /// Its rows: along the normal, and along the tangents where it has friction.
   Index rows() const { return friction == 0.0 ? 1 : 3; }

@@ -161,6 +161,36 @@ TEST(SkinnedSurfaces, ABarThatFallsBackOnAPlaneGainsNoEnergyAndDoesNotSinkIn) {
       }
 }
 
+/// A contact's force is turned back with the skin where it presses: what yields goes along it, however the bar bends.
+TEST(SkinnedSurfaces, GameContactPressesABentBarAlongItsForce) {
+  const auto model = bar({.residual = true, .cells = 10});
+  ContactFinder finder;
+  World world(kWeightless);
+  world.set_contact_source(&finder, {.friction = 0.0});
+  const BodyId id = world.add_body(model);
+  const SurfacePoint end = vertex_at(*model, {kLength, 0.75, 1.0});
+  const Vec3 straight = world.position(id, end);
+  std::vector<double> z = bent(*model, 80.0 * kDegree);
+  for (std::size_t i = 1; i < z.size(); ++i) z[i] = 0.0;
+  world.set_amplitudes(id, z, zeros(*model));
+  const Vec3 back = (straight - world.position(id, end)).normalized();
+  const Vec3 axis = -Vec3::UnitZ().cross(back);
+  world.add_static(std::make_shared<Shape>(HalfSpace{}),
+                   {quaternion_from_rotation_vector(std::acos(-back.z()) * axis.normalized()),
+                    world.position(id, end) + 0.1 * back});
+  for (int i = 0; i < 20 && world.contact_events().empty(); ++i) world.step();
+  ASSERT_FALSE(world.contact_events().empty());
+  Vec3 deepest = Vec3::Zero();
+  for (Index t = 0; t < static_cast<Index>(model->collision().triangles.size()); ++t)
+    for (std::size_t c = 0; c < 3; ++c) {
+      SurfacePoint at{.triangle = t, .weight = {0.0, 0.0, 0.0}};
+      at.weight[c] = 1.0;
+      const Vec3 u = world.indentation(id, at);
+      if (u.norm() > deepest.norm()) deepest = u;
+    }
+  EXPECT_GT(-back.dot(deepest), 0.9 * deepest.norm());
+}
+
 /// Two free bars on a joint, bent and turning, without damping: joints act on the way on which the bodies bend.
 TEST(WorldWithSkins, BarsOnAJointKeepTheirEnergyAndStayTogether) {
   const auto model = bar({.held = false});
