@@ -33,7 +33,27 @@ constexpr Block8 kOfFrames{{1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f}};
 
 double sum_of(const double (&x)[8]) { return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7])); }
 
-Vec3 read_vector(const float* from) { return {from[0], from[1], from[2]}; }
+// One lane of eight.
+Vec3 vector_in(const Double8* from, std::size_t lane) { return {from[0].v[lane], from[1].v[lane], from[2].v[lane]}; }
+
+Quaternion quaternion_in(const Double8* from, std::size_t lane) {
+  return {from[0].v[lane], from[1].v[lane], from[2].v[lane], from[3].v[lane]};
+}
+
+void put(const Vec3& v, Double8* to, std::size_t lane) {
+  for (Eigen::Index i = 0; i < 3; ++i) to[i].v[lane] = v[i];
+}
+
+void put(const Quaternion& q, Double8* to, std::size_t lane) {
+  to[0].v[lane] = q.w;
+  put(q.vector(), to + 1, lane);
+}
+
+void put(const Mat3& m, Double8 (*to)[3], std::size_t lane) {
+  for (Eigen::Index i = 0; i < 3; ++i) put(m.row(i), to[i], lane);
+}
+
+constexpr std::size_t kBodiesAtOnce = 32;  // of one thread
 
 }  // namespace
 
@@ -49,6 +69,7 @@ void GameBodies::begin_step(std::span<const ConstrainedBody> table, std::span<co
   bodies_.clear();
   led_.clear();
   by_number_.assign(table.size(), -1);
+  frames_.assign((members.size() + kFramesAtOnce - 1) / kFramesAtOnce, {});
   std::int32_t blocks = 0;
   for (const Index member : members) {
     const ConstrainedBody& at = table[static_cast<std::size_t>(member)];
@@ -63,13 +84,13 @@ void GameBodies::begin_step(std::span<const ConstrainedBody> table, std::span<co
     blocks += body.blocks;
     at.group->begin_parts(at.slot);
     const RigidFrame& frame = at.group->frame(at.slot);
-    place_frame(body, frame);
     if (!is_free(body)) {
       body.led = static_cast<std::int32_t>(led_.size());
       led_.push_back({frame.parent(), frame.next_parent(), frame.has_next_parent(), frame});
     }
     by_number_[static_cast<std::size_t>(member)] = static_cast<std::int32_t>(bodies_.size());
     bodies_.push_back(body);
+    place_frame(bodies_.size() - 1, frame);
   }
   const auto count = static_cast<std::size_t>(blocks) + 1;
   for (std::vector<Block8>* all : {&motion_, &free_, &answers_, &shapes_}) all->assign(count, {});
@@ -80,27 +101,43 @@ void GameBodies::begin_step(std::span<const ConstrainedBody> table, std::span<co
 }
 
 /// Its inertia is that of the step's middle, as far as can be told from how it turns now.
-void GameBodies::place_frame(GameBody& body, const RigidFrame& frame) {
+void GameBodies::place_frame(std::size_t at, const RigidFrame& frame) {
+  GameBody& body = bodies_[at];
+  EightFrames& of = frames_[at / kFramesAtOnce];
+  const std::size_t lane = at % kFramesAtOnce;
   const FrameConstants& c = body.group->frame_constants();
-  body.start.p = frame.pose().p;
-  body.q = frame.pose().q;
-  body.start.R = to_matrix(body.q);
-  body.v = frame.velocity();
+  const Quaternion& q = frame.pose().q;
+  of.first[lane] = body.first;
+  body.start = {frame.pose().p, to_matrix(q)};
+  put(body.start.R, of.start, lane);
+  put(q, of.now.attitude, lane);
+  put(frame.velocity(), of.now.v, lane);
+  of.loads.left.v[lane] = of.loads.turn_left.v[lane] = 1.0;
   body.turns_locked = frame.settings().locks.rotation != AxisLocks{}.rotation;
   if (c.motion == FrameMotion::kKinematic) return;
-  if (c.motion == FrameMotion::kFree) body.root_mass = std::sqrt(c.mass);
   for (std::size_t i = 0; i < 3; ++i)
     if (frame.settings().locks.translation[i]) body.goes[static_cast<Eigen::Index>(i)] = 0.0;
   body.roots = c.motion == FrameMotion::kLine ? Vec3(std::sqrt(line_inertia(c)), 0.0, 0.0)
                                               : Vec3(c.principal.moments.cwiseSqrt());
-  set_axes(body, turned(body.q, 0.5 * plan_.step * frame.angular_velocity(c)));
-  if (c.motion != FrameMotion::kLine) body.turn = body.turn_scale * frame.angular_momentum(c);
+  set_axes(at, turned(q, 0.5 * plan_.step * frame.angular_velocity(c)));
+  if (c.motion != FrameMotion::kLine) put(body.turn_scale * frame.angular_momentum(c), of.now.turn, lane);
   if (c.motion != FrameMotion::kFree) return;
+  body.root_mass = std::sqrt(c.mass);
+  of.root_mass.v[lane] = body.root_mass, of.per_root.v[lane] = 1.0 / body.root_mass;
   const Mat3 axes = to_matrix(c.principal.q_BP);
-  body.inverse_inertia = axes * c.principal.moments.cwiseInverse().asDiagonal() * axes.transpose();
+  put(Mat3(axes * c.principal.moments.cwiseInverse().asDiagonal() * axes.transpose()), of.inverse_inertia, lane);
+  tell_loads(at);
 }
 
-void GameBodies::set_axes(GameBody& body, const Quaternion& attitude) {
+void GameBodies::keep_axes(std::int32_t at) {
+  const auto i = static_cast<std::size_t>(at);
+  GameBody& body = bodies_[i];
+  body.keeps_axes = true;
+  if (body.led < 0 && !body.turns_locked) frames_[i / kFramesAtOnce].keeps_axes.v[i % kFramesAtOnce] = 1.0;
+}
+
+void GameBodies::set_axes(std::size_t at, const Quaternion& attitude) {
+  GameBody& body = bodies_[at];
   const FrameConstants& c = body.group->frame_constants();
   if (c.motion == FrameMotion::kLine) {
     body.turn_scale.row(0) = (attitude * c.line_axis).transpose() / body.roots.x();
@@ -113,29 +150,31 @@ void GameBodies::set_axes(GameBody& body, const Quaternion& attitude) {
   } else {
     body.turn_scale = body.roots.cwiseInverse().asDiagonal() * to_matrix(attitude * c.principal.q_BP).transpose();
   }
+  EightFrames& of = frames_[at / kFramesAtOnce];
+  put(body.turn_scale, of.turn_scale, at % kFramesAtOnce);
+  put(Mat3(body.roots.cwiseAbs2().asDiagonal() * body.turn_scale), of.momentum, at % kFramesAtOnce);
+}
+
+Vec3 GameBodies::momentum_of(std::size_t at) const {
+  const GameBody& body = bodies_[at];
+  const Vec3 turn = vector_in(frames_[at / kFramesAtOnce].now.turn, at % kFramesAtOnce);
+  return body.turn_scale.transpose() * body.roots.cwiseAbs2().cwiseProduct(turn);
 }
 
 void GameBodies::turn_axes() {
-  for (GameBody& body : bodies_) {
+  for (std::size_t at = 0; at < bodies_.size(); ++at) {
+    const GameBody& body = bodies_[at];
     const FrameConstants& c = body.group->frame_constants();
     if (body.keeps_axes || c.motion == FrameMotion::kKinematic) continue;
-    const Vec3 momentum = body.momentum();
-    set_axes(body, body.q);
+    EightFrames& of = frames_[at / kFramesAtOnce];
+    const Quaternion q = quaternion_in(of.now.attitude, at % kFramesAtOnce);
+    const Vec3 momentum = momentum_of(at);
+    set_axes(at, q);
     const Vec3 omega = body.turn_scale.transpose() * (body.turn_scale * momentum);
-    set_axes(body, turned(body.q, 0.5 * plan_.length() * omega));
-    if (c.motion != FrameMotion::kLine) body.turn = body.turn_scale * momentum;
+    set_axes(at, turned(q, 0.5 * plan_.length() * omega));
+    if (c.motion != FrameMotion::kLine) put(body.turn_scale * momentum, of.now.turn, at % kFramesAtOnce);
+    if (body.led < 0) tell_loads(at);
   }
-}
-
-/// Where rows are of an attitude that the body has left, its momentum no longer tells how it turns: by the inertia in
-/// the middle of the substep. @param R the attitude now
-Vec3 GameBodies::free_turn(const GameBody& body, const Mat3& R) const {
-  if (!body.keeps_axes || body.led >= 0 || body.turns_locked) return body.turn;
-  const double half = 0.5 * plan_.length();
-  const Vec3 momentum = R.transpose() * body.momentum();  // body axes
-  const Vec3 now = body.inverse_inertia * momentum;
-  const Vec3 middle = body.inverse_inertia * (momentum + half * momentum.cross(now));
-  return body.roots.cwiseProduct(body.roots.cwiseProduct(body.turn_scale * (R * (middle + half * now.cross(middle)))));
 }
 
 void GameBodies::write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const {
@@ -164,35 +203,36 @@ FrameLoad GameBodies::load_of(const GameBody& body) const {
 
 template <class Visit>
 void GameBodies::for_all(Jobs& jobs, const Visit& visit) const {
-  constexpr std::size_t kBodiesAtOnce = 32;
   const auto part = [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) visit(i);
   };
   jobs.parallel_for(bodies_.size(), kBodiesAtOnce, std::ref(part));
 }
 
-void GameBodies::begin_substep(int number, Jobs& jobs) {
-  for_all(jobs, [&](std::size_t i) { begin_substep_of(i, number); });
+template <class Visit>
+void GameBodies::for_all_frames(Jobs& jobs, const Visit& visit) {
+  const FrameArrays all{frames_.data(), frames_.size(), shifts_.data(),  pushes_.data(),
+                        free_.data(),   motion_.data(), answers_.data(), plan_.length()};
+  const auto part = [&](std::size_t begin, std::size_t end) { visit(all.part(begin, end)); };
+  jobs.parallel_for(frames_.size(), kBodiesAtOnce / kFramesAtOnce, std::ref(part));
 }
 
-void GameBodies::begin_substep_of(std::size_t at, int number) {
+void GameBodies::begin_substep(int number, Jobs& jobs) {
+  for_all_frames(jobs, [](const FrameArrays& part) { begin_frames(part); });
+  for_all(jobs, [&](std::size_t i) { begin_beside_frame(i, number); });
+}
+
+/// What leads it, and its modes.
+void GameBodies::begin_beside_frame(std::size_t at, int number) {
   GameBody& body = bodies_[at];
-  const Mat3 R = to_matrix(body.q);
-  tell_shift(at, R);
+  if (body.modes == nullptr && body.led < 0) return;
   FrameExcitation excitation;
-  if (body.led < 0)
-    fall(body);
-  else
-    excitation = lead(body, number, shifts_[at]);
+  if (body.led >= 0) excitation = lead(at, number);
   if (body.modes != nullptr) {
     body.group->advance_modes(body.slot, body.modes->flow(), number, plan_.count, excitation);
     write_modes(body, free_);
   }
-  if (body.led >= 0) swing(body);
-  Block8& frame = free_[static_cast<std::size_t>(body.first)];
-  write_vector(body.root_mass * body.v, frame.v);
-  body.free_turn = free_turn(body, R);
-  write_vector(body.free_turn, frame.v + 3);
+  if (body.led >= 0) swing(at);
   for (auto i = static_cast<std::size_t>(body.first), end = i + static_cast<std::size_t>(body.blocks); i < end; ++i)
     for (int l = 0; l < 8; ++l) motion_[i].v[l] = free_[i].v[l] + answers_[i].v[l];
 }
@@ -225,27 +265,29 @@ void GameBodies::scale_answer(std::size_t at, float share, std::span<const doubl
 
 /// Held forces come at the substep's start, so that what rests has no velocity. Of the substep that begins, velocities
 /// are damped as they would be at its end.
-void GameBodies::fall(GameBody& body) const {
+void GameBodies::tell_loads(std::size_t at) {
+  const GameBody& body = bodies_[at];
+  EightFrames& of = frames_[at / kFramesAtOnce];
+  const std::size_t lane = at % kFramesAtOnce;
   const double h = plan_.length();
   const FrameLoad load = load_of(body);
   const Decay moving(settings(body).linear_damping * h), turning(settings(body).angular_damping * h);
   const Vec3 acceleration = load.gravity + load.force / body.group->frame_constants().mass;
-  body.v = moving.left * body.v + h * moving.first * acceleration.cwiseProduct(body.goes);
-  body.turn *= turning.left;
-  if (!load.torque.isZero(0.0)) body.turn += h * turning.first * (body.turn_scale * load.torque);
+  of.loads.left.v[lane] = moving.left, of.loads.turn_left.v[lane] = turning.left;
+  put(h * moving.first * acceleration.cwiseProduct(body.goes), of.loads.gain, lane);
+  put(h * turning.first * (body.turn_scale * load.torque), of.loads.turn_gain, lane);
 }
 
-Vec3 GameBodies::fall_of(std::int32_t at) const {
-  if (at < 0 || body(at).led >= 0) return Vec3::Zero();
-  const GameBody& falls = body(at);
-  const FrameLoad load = load_of(falls);
-  const double h = plan_.length();
-  const Vec3 acceleration = load.gravity + load.force / falls.group->frame_constants().mass;
-  return h * h * Decay(settings(falls).linear_damping * h).first * acceleration.cwiseProduct(falls.goes);
+Vec3 GameBodies::fall_of(std::int32_t number) const {
+  if (number < 0) return Vec3::Zero();
+  const auto at = static_cast<std::size_t>(number);
+  return plan_.length() * vector_in(frames_[at / kFramesAtOnce].loads.gain, at % kFramesAtOnce);
 }
 
 /// A body with fixed nodes: its parent goes through the substep, and it begins to swing there as it would by itself.
-FrameExcitation GameBodies::lead(GameBody& body, int number, FrameShift& shift) {
+FrameExcitation GameBodies::lead(std::size_t at, int number) {
+  const GameBody& body = bodies_[at];
+  FrameShift& shift = shifts_[at];
   const FrameConstants& c = body.group->frame_constants();
   const RigidFrame& now = body.group->frame(body.slot);
   LedBody& led = led_[static_cast<std::size_t>(body.led)];
@@ -263,14 +305,21 @@ FrameExcitation GameBodies::lead(GameBody& body, int number, FrameShift& shift) 
 }
 
 /// To the end of the substep.
-void GameBodies::swing(GameBody& body) {
+void GameBodies::swing(std::size_t at) {
+  const GameBody& body = bodies_[at];
+  EightFrames& of = frames_[at / kFramesAtOnce];
+  const std::size_t lane = at % kFramesAtOnce;
   const FrameConstants& c = body.group->frame_constants();
   RigidFrame& free = led_[static_cast<std::size_t>(body.led)].free;
   free.end_step(c, load_of(body), body.group->first_moment(body.slot), plan_.length());
-  if (c.motion == FrameMotion::kPoint) body.turn = body.turn_scale * free.angular_momentum(c);
+  if (c.motion == FrameMotion::kPoint) put(body.turn_scale * free.angular_momentum(c), of.now.turn, lane);
   if (c.motion == FrameMotion::kLine)
-    body.turn.x() = std::sqrt(line_inertia(c)) *
-                    (free.pose().q * c.line_axis).dot(free.angular_velocity(c) - free.parent().angular_velocity);
+    of.now.turn[0].v[lane] =
+        std::sqrt(line_inertia(c)) *
+        (free.pose().q * c.line_axis).dot(free.angular_velocity(c) - free.parent().angular_velocity);
+  const Vec3 turn = vector_in(of.now.turn, lane);
+  put(turn, of.now.free_turn, lane);
+  write_vector(turn, free_[static_cast<std::size_t>(body.first)].v + 3);
 }
 
 void GameBodies::write_modes(const GameBody& body, std::vector<Block8>& to) const {
@@ -281,20 +330,25 @@ void GameBodies::write_modes(const GameBody& body, std::vector<Block8>& to) cons
 }
 
 void GameBodies::end_substep(bool pushed, Jobs& jobs) {
-  for_all(jobs, [&](std::size_t i) { end_substep_of(i, pushed); });
+  for_all_frames(jobs, [&](const FrameArrays& part) { end_frames(part, pushed); });
+  for_all(jobs, [&](std::size_t i) { end_beside_frame(i); });
 }
 
-void GameBodies::end_substep_of(std::size_t at, bool pushed) {
+void GameBodies::end_beside_frame(std::size_t at) {
   GameBody& body = bodies_[at];
-  for (auto i = static_cast<std::size_t>(body.first), end = i + static_cast<std::size_t>(body.blocks); i < end; ++i)
-    for (int l = 0; l < 8; ++l) answers_[i].v[l] = motion_[i].v[l] - free_[i].v[l];
   if (body.modes != nullptr) move_modes(body);
-  move_frame(at, pushed);
+  if (body.led >= 0)
+    turn_led(at, quaternion_in(frames_[at / kFramesAtOnce].now.turned, at % kFramesAtOnce));
+  else if (plan_.seen)
+    show(at);
 }
 
 void GameBodies::move_modes(GameBody& body) {
   const std::span<double> z = body.group->amplitudes_in_parts(body.slot), rates = body.group->rates_in_parts(body.slot);
-  const Block8* q = &answers_[static_cast<std::size_t>(body.first + 1)];
+  const auto first = static_cast<std::size_t>(body.first), end = first + static_cast<std::size_t>(body.blocks);
+  for (std::size_t i = first + 1; i < end; ++i)
+    for (int l = 0; l < 8; ++l) answers_[i].v[l] = motion_[i].v[l] - free_[i].v[l];
+  const Block8* q = &answers_[first + 1];
   const std::vector<float>&roots = body.modes->roots(), &by = body.modes->rates();
   for (std::size_t i = 0; i < z.size(); ++i) {
     const double change = static_cast<double>(q[i / 8].v[i % 8]);
@@ -304,44 +358,23 @@ void GameBodies::move_modes(GameBody& body) {
   write_modes(body, shapes_);
 }
 
-void GameBodies::move_frame(std::size_t at, bool pushed) {
-  GameBody& body = bodies_[at];
-  const double h = plan_.length();
-  const Block8 &q = answers_[static_cast<std::size_t>(body.first)], &push = pushes_[at];
-  const Vec3 change = read_vector(q.v + 3);
-  body.turn += change;
-  Vec3 turn = h * (body.turn_scale.transpose() * (body.free_turn + change));
-  if (pushed) turn += h * (body.turn_scale.transpose() * read_vector(push.v + 3));
-  const Quaternion turned = quaternion_from_rotation_vector(turn);
-  if (body.led < 0) {
-    body.v += read_vector(q.v) / body.root_mass;
-    body.shift += h * body.v;
-    if (pushed) body.shift += h / body.root_mass * read_vector(push.v);
-    body.q = normalized(turned * body.q);
-    if (plan_.seen) show(body);
-  } else {
-    turn_led(body, turned);
-  }
-}
-
-void GameBodies::tell_shift(std::size_t at, const Mat3& R) {
+void GameBodies::displace(std::int32_t number, const double* speed, const double* place) {
+  const auto at = static_cast<std::size_t>(number);
   const GameBody& body = bodies_[at];
-  write_vector(body.shift, shifts_[at].shift);
-  write_matrix(R - body.start.R, shifts_[at].turned);
-}
-
-void GameBodies::displace(std::int32_t at, const double* speed, const double* place) {
-  GameBody& body = bodies_[static_cast<std::size_t>(at)];
+  EightFrames& of = frames_[at / kFramesAtOnce];
+  const std::size_t lane = at % kFramesAtOnce;
   const double h = plan_.length();
   const auto vector = [](const double* from) { return Vec3(from[0], from[1], from[2]); };
-  body.turn += vector(speed + 3);
-  body.q = turned(body.q, h * (body.turn_scale.transpose() * (vector(speed + 3) + vector(place + 3))));
+  put(vector_in(of.now.turn, lane) + vector(speed + 3), of.now.turn, lane);
+  put(turned(quaternion_in(of.now.attitude, lane),
+             h * (body.turn_scale.transpose() * (vector(speed + 3) + vector(place + 3)))),
+      of.now.attitude, lane);
   if (body.led < 0) {
-    body.v += vector(speed) / body.root_mass;
-    body.shift += h / body.root_mass * (vector(speed) + vector(place));
-    show(body);
+    put(vector_in(of.now.v, lane) + vector(speed) / body.root_mass, of.now.v, lane);
+    put(vector_in(of.now.shift, lane) + h / body.root_mass * (vector(speed) + vector(place)), of.now.shift, lane);
+    show(at);
   } else {
-    tell_led(body);
+    tell_led(at);
   }
   if (body.modes == nullptr) return;
   const std::span<double> z = body.group->amplitudes_in_parts(body.slot), rates = body.group->rates_in_parts(body.slot);
@@ -354,41 +387,54 @@ void GameBodies::displace(std::int32_t at, const double* speed, const double* pl
 }
 
 /// To its group.
-void GameBodies::show(GameBody& body) const {
-  body.group->frame_in_parts(body.slot).set_motion({body.q, body.start.p + body.shift}, body.v, body.momentum());
+void GameBodies::show(std::size_t at) {
+  GameBody& body = bodies_[at];
+  const EightFrames& of = frames_[at / kFramesAtOnce];
+  const std::size_t lane = at % kFramesAtOnce;
+  body.group->frame_in_parts(body.slot).set_motion(
+      {quaternion_in(of.now.attitude, lane), body.start.p + vector_in(of.now.shift, lane)}, vector_in(of.now.v, lane),
+      momentum_of(at));
 }
 
 /// Where its parent has brought it, turned as constraints have it.
-void GameBodies::turn_led(GameBody& body, const Quaternion& turned) {
+void GameBodies::turn_led(std::size_t at, const Quaternion& turned) {
+  const GameBody& body = bodies_[at];
+  Double8* attitude = frames_[at / kFramesAtOnce].now.attitude;
+  const std::size_t lane = at % kFramesAtOnce;
   const FrameConstants& c = body.group->frame_constants();
   const RigidFrame& end = led_[static_cast<std::size_t>(body.led)].free;
+  const Quaternion q = turned * quaternion_in(attitude, lane);
   if (c.motion == FrameMotion::kPoint)
-    body.q = normalized(turned * body.q);
+    put(normalized(q), attitude, lane);
   else if (c.motion == FrameMotion::kLine)
-    body.q =
-        normalized(end.parent().pose.q * body.group->frame(body.slot).parent().pose.q.conjugate() * turned * body.q);
+    put(normalized(end.parent().pose.q * body.group->frame(body.slot).parent().pose.q.conjugate() * q), attitude, lane);
   else
-    body.q = end.pose().q;
-  tell_led(body);
+    put(end.pose().q, attitude, lane);
+  tell_led(at);
 }
 
-void GameBodies::tell_led(GameBody& body) {
+void GameBodies::tell_led(std::size_t at) {
+  const GameBody& body = bodies_[at];
+  EightFrames& of = frames_[at / kFramesAtOnce];
+  const std::size_t lane = at % kFramesAtOnce;
   const FrameConstants& c = body.group->frame_constants();
+  const Quaternion q = quaternion_in(of.now.attitude, lane);
   RigidFrame& end = led_[static_cast<std::size_t>(body.led)].free;
-  if (c.motion == FrameMotion::kPoint) end.set_turn(c, body.q, body.momentum());
+  if (c.motion == FrameMotion::kPoint) end.set_turn(c, q, momentum_of(at));
   if (c.motion == FrameMotion::kLine) {
     const Vec3 omega =
-        end.parent().angular_velocity + body.turn.x() / std::sqrt(line_inertia(c)) * (body.q * c.line_axis);
-    end.set_turn(c, body.q, body.q * (c.inertia * (body.q.conjugate() * omega)));
+        end.parent().angular_velocity + of.now.turn[0].v[lane] / std::sqrt(line_inertia(c)) * (q * c.line_axis);
+    end.set_turn(c, q, q * (c.inertia * (q.conjugate() * omega)));
   }
   body.group->frame_in_parts(body.slot) = end;
-  body.shift = end.pose().p - body.start.p;
-  body.v = end.velocity();
+  put(end.pose().p - body.start.p, of.now.shift, lane);
+  put(end.velocity(), of.now.v, lane);
 }
 
 void GameBodies::end_step() {
-  for (GameBody& body : bodies_) {
-    if (body.led < 0) show(body);
+  for (std::size_t at = 0; at < bodies_.size(); ++at) {
+    const GameBody& body = bodies_[at];
+    if (body.led < 0) show(at);
     body.group->end_parts(body.slot);
   }
 }
@@ -408,12 +454,17 @@ double GameBodies::modal_motion(std::int32_t at) const {
 }
 
 bool GameBodies::all_finite() const {
-  return std::ranges::all_of(bodies_, [](const GameBody& body) {
-    const std::span<const double> z = body.group->amplitudes(body.slot), rates = body.group->rates(body.slot);
-    const auto finite = [](double x) { return std::isfinite(x); };
-    return body.shift.allFinite() && body.v.allFinite() && body.turn.allFinite() && std::ranges::all_of(z, finite) &&
-           std::ranges::all_of(rates, finite);
-  });
+  const auto finite = [](double x) { return std::isfinite(x); };
+  for (std::size_t at = 0; at < bodies_.size(); ++at) {
+    const GameBody& body = bodies_[at];
+    const EightFrames& of = frames_[at / kFramesAtOnce];
+    for (const Double8* field : {of.now.shift, of.now.v, of.now.turn})
+      if (!vector_in(field, at % kFramesAtOnce).allFinite()) return false;
+    if (!std::ranges::all_of(body.group->amplitudes(body.slot), finite) ||
+        !std::ranges::all_of(body.group->rates(body.slot), finite))
+      return false;
+  }
+  return true;
 }
 
 }  // namespace limber::internal

@@ -12,11 +12,11 @@
 #include <span>
 #include <vector>
 
+#include "frame_kernels.h"
 #include "limber/constraints/body_response.h"
 #include "limber/core/jobs.h"
 #include "limber/dynamics/surface_point.h"
 #include "substep_modes.h"
-#include "sweep_kernels.h"
 
 namespace limber::internal {
 
@@ -52,16 +52,7 @@ struct GameBody {
     Vec3 p = Vec3::Zero();
     Mat3 R = Mat3::Identity();
   } start{};                         // pose at the step's start
-  Vec3 shift = Vec3::Zero();         // of the origin since then
-  Quaternion q{};                    // attitude now
-  Vec3 v = Vec3::Zero();             // of the origin
-  Vec3 turn = Vec3::Zero();          // coordinates of the turn, L
   double along = 0.0, square = 0.0;  // q·y₀, and twice the energy of q, by find_answers()
-  // Of bodies that keep their axes: the turn of the substep at hand if nothing acted, ω; 1/(kg·m²), body axes.
-  Vec3 free_turn = Vec3::Zero();
-  Mat3 inverse_inertia = Mat3::Zero();
-
-  Vec3 momentum() const { return turn_scale.transpose() * roots.cwiseProduct(roots.cwiseProduct(turn)); }
 };
 
 class GameBodies {
@@ -69,7 +60,7 @@ class GameBodies {
   /// The bodies of a step as it begins. @param members ascending, all that move
   void begin_step(std::span<const ConstrainedBody> table, std::span<const Index> members, const SubstepPlan& plan);
   /// Something has rows in its coordinates for the whole step.
-  void keep_axes(std::int32_t at) { bodies_[static_cast<std::size_t>(at)].keeps_axes = true; }
+  void keep_axes(std::int32_t at);
   /// The inertia of the others becomes that of the coming substep's middle.
   void turn_axes();
   /// Free motion of all, and with the forces of the substep before. @param number 0 …
@@ -82,7 +73,7 @@ class GameBodies {
   void end_substep(bool pushed, Jobs& jobs);
   /// Moves one of them further. @param speed, place changes of its coordinates: with the speed that goes with them, and
   /// without
-  void displace(std::int32_t at, const double* speed, const double* place);
+  void displace(std::int32_t number, const double* speed, const double* place);
   /// Their groups take over.
   void end_step();
 
@@ -107,7 +98,7 @@ class GameBodies {
 
   /// By how much more held forces move the origin of a body that is free in a substep than in the last one, m; of
   /// others 0.
-  Vec3 fall_of(std::int32_t at) const;
+  Vec3 fall_of(std::int32_t number) const;
 
   /// Writes a force's or torque's part of a row in a frame's coordinates. @param linear, moment world
   void write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const;
@@ -120,28 +111,29 @@ class GameBodies {
   /// Calls visit(i) of each body, in parts.
   template <class Visit>
   void for_all(Jobs& jobs, const Visit& visit) const;
-  void begin_substep_of(std::size_t at, int number);
-  void end_substep_of(std::size_t at, bool pushed);
-  void place_frame(GameBody& body, const RigidFrame& frame);
-  static void set_axes(GameBody& body, const Quaternion& attitude);
+  /// Calls visit(frames) of all, in parts.
+  template <class Visit>
+  void for_all_frames(Jobs& jobs, const Visit& visit);
+  void begin_beside_frame(std::size_t at, int number);
+  void end_beside_frame(std::size_t at);
+  void place_frame(std::size_t at, const RigidFrame& frame);
+  void set_axes(std::size_t at, const Quaternion& attitude);
   static const FrameSettings& settings(const GameBody& body) { return body.group->frame(body.slot).settings(); }
-  void fall(GameBody& body) const;
-  Vec3 free_turn(const GameBody& body, const Mat3& R) const;
-  FrameExcitation lead(GameBody& body, int number, FrameShift& shift);
-  void swing(GameBody& body);
-  void turn_led(GameBody& body, const Quaternion& turned);
-  void tell_led(GameBody& body);
-  void tell_shift(std::size_t at, const Mat3& R);
+  void tell_loads(std::size_t at);
+  FrameExcitation lead(std::size_t at, int number);
+  void swing(std::size_t at);
+  void turn_led(std::size_t at, const Quaternion& turned);
+  void tell_led(std::size_t at);
   FrameLoad load_of(const GameBody& body) const;
   void write_modes(const GameBody& body, std::vector<Block8>& to) const;
-  void advance_modes(GameBody& body, int number, const FrameExcitation& excitation);
   void move_modes(GameBody& body);
-  void move_frame(std::size_t at, bool pushed);
-  void show(GameBody& body) const;
+  void show(std::size_t at);
+  Vec3 momentum_of(std::size_t at) const;
   SubstepModes& modes_of(const ModalModel& model);
 
   SubstepPlan plan_;
   std::vector<GameBody> bodies_;
+  std::vector<EightFrames> frames_;  // of all, eight by eight
   std::vector<std::int32_t> by_number_;
   std::vector<std::unique_ptr<SubstepModes>> modes_;  // by model
   std::vector<LedBody> led_;

@@ -1,0 +1,225 @@
+#include "frame_kernels.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "game/frame_kernels.cpp"
+// Arrays of vectors, as in sweep_kernels.cpp.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include <hwy/foreach_target.h>
+// foreach_target first
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace limber::internal::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Doubles = hn::CappedTag<double, kFramesAtOnce>;
+using Wide = hn::Vec<Doubles>;
+using Singles = hn::Rebind<float, Doubles>;
+constexpr std::size_t kDoubles = hn::MaxLanes(Doubles());
+
+HWY_INLINE HWY_ATTR Wide Get(const Double8& from, std::size_t lane) { return hn::Load(Doubles(), from.v + lane); }
+HWY_INLINE HWY_ATTR void Put(Wide x, Double8& to, std::size_t lane) { hn::Store(x, Doubles(), to.v + lane); }
+HWY_INLINE HWY_ATTR Wide Get(const Block8& from, std::size_t lane) {
+  return hn::PromoteTo(Doubles(), hn::Load(Singles(), from.v + lane));
+}
+HWY_INLINE HWY_ATTR void Put(Wide x, Block8& to, std::size_t lane) {
+  hn::Store(hn::DemoteTo(Singles(), x), Singles(), to.v + lane);
+}
+
+/// M x, or Mᵀ x.
+HWY_INLINE HWY_ATTR void Multiply(const Double8 (&m)[3][3], bool transposed, const Wide* x, std::size_t lane,
+                                  Wide* to) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    to[i] = hn::Mul(transposed ? Get(m[0][i], lane) : Get(m[i][0], lane), x[0]);
+    for (std::size_t j = 1; j < 3; ++j)
+      to[i] = hn::MulAdd(transposed ? Get(m[j][i], lane) : Get(m[i][j], lane), x[j], to[i]);
+  }
+}
+
+/// base + scale (a × b).
+HWY_INLINE HWY_ATTR void AddCross(const Wide* base, Wide scale, const Wide* a, const Wide* b, Wide* to) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    to[i] = hn::MulAdd(scale, hn::NegMulAdd(a[k], b[j], hn::Mul(a[j], b[k])), base[i]);
+  }
+}
+
+/// R of unit quaternions.
+HWY_INLINE HWY_ATTR void Rotation(const Wide* q, Wide (*R)[3]) {
+  const Doubles d;
+  const Wide one = hn::Set(d, 1.0);
+  Wide twice[3];
+  for (std::size_t i = 0; i < 3; ++i) twice[i] = hn::Add(q[1 + i], q[1 + i]);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    R[i][i] = hn::NegMulAdd(twice[k], q[1 + k], hn::NegMulAdd(twice[j], q[1 + j], one));
+    const Wide product = hn::Mul(twice[i], q[1 + j]), spin = hn::Mul(twice[k], q[0]);
+    R[i][j] = hn::Sub(product, spin);
+    R[j][i] = hn::Add(product, spin);
+  }
+}
+
+/// a b.
+HWY_INLINE HWY_ATTR void Product(const Wide* a, const Wide* b, Wide* to) {
+  to[0] = hn::NegMulAdd(a[1], b[1], hn::NegMulAdd(a[2], b[2], hn::NegMulAdd(a[3], b[3], hn::Mul(a[0], b[0]))));
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    const Wide sum = hn::MulAdd(a[0], b[1 + i], hn::Mul(a[1 + i], b[0]));
+    to[1 + i] = hn::NegMulAdd(a[1 + k], b[1 + j], hn::MulAdd(a[1 + j], b[1 + k], sum));
+  }
+}
+
+/// c₀ + c₁ x + … of the series 1/first! − x/(first + 2)! + …
+HWY_INLINE HWY_ATTR Wide Series(double first, Wide x) {
+  constexpr int kTerms = 10;
+  const Doubles d;
+  const Wide one = hn::Set(d, 1.0);
+  Wide sum = one;
+  for (int i = kTerms; i > 0; --i) {
+    const double n = 2.0 * i + first;
+    sum = hn::NegMulAdd(hn::Mul(hn::Set(d, 1.0 / (n * (n - 1.0))), x), sum, one);
+  }
+  return sum;
+}
+
+/// Quaternions of rotation vectors: those of their quarters, by the series of sine and cosine, squared twice. To
+/// round-off up to 8 rad.
+HWY_INLINE HWY_ATTR void Turned(const Wide* r, Wide* q) {
+  const Doubles d;
+  Wide quarter[3], square = hn::Zero(d);
+  for (std::size_t i = 0; i < 3; ++i) {
+    quarter[i] = hn::Mul(hn::Set(d, 0.125), r[i]);
+    square = hn::MulAdd(quarter[i], quarter[i], square);
+  }
+  q[0] = Series(0.0, square);
+  const Wide sine = Series(1.0, square);
+  for (std::size_t i = 0; i < 3; ++i) q[1 + i] = hn::Mul(sine, quarter[i]);
+  for (int i = 0; i < 2; ++i) {
+    const Wide w = q[0];
+    q[0] = hn::Mul(w, w);
+    for (std::size_t k = 1; k < 4; ++k) {
+      q[0] = hn::NegMulAdd(q[k], q[k], q[0]);
+      q[k] = hn::Mul(hn::Add(w, w), q[k]);
+    }
+  }
+}
+
+/// Where rows are of an attitude that the body has left, its momentum no longer tells how it turns: by the inertia in
+/// the middle of the substep.
+HWY_INLINE HWY_ATTR void FreeTurn(const EightFrames& f, double h, const Wide (*R)[3], const Wide* turn,
+                                  std::size_t lane, Wide* free) {
+  const Doubles d;
+  const Wide half = hn::Set(d, 0.5 * h);
+  Wide world[3], momentum[3], now[3], later[3], middle[3], spin[3];
+  Multiply(f.momentum, true, turn, lane, world);
+  for (std::size_t i = 0; i < 3; ++i)
+    momentum[i] = hn::MulAdd(R[0][i], world[0], hn::MulAdd(R[1][i], world[1], hn::Mul(R[2][i], world[2])));
+  Multiply(f.inverse_inertia, false, momentum, lane, now);
+  AddCross(momentum, half, momentum, now, later);
+  Multiply(f.inverse_inertia, false, later, lane, middle);
+  AddCross(middle, half, now, middle, spin);
+  for (std::size_t i = 0; i < 3; ++i)
+    world[i] = hn::MulAdd(R[i][0], spin[0], hn::MulAdd(R[i][1], spin[1], hn::Mul(R[i][2], spin[2])));
+  Multiply(f.momentum, false, world, lane, free);
+  const auto keeps = hn::Gt(Get(f.keeps_axes, lane), hn::Zero(d));
+  for (std::size_t i = 0; i < 3; ++i) free[i] = hn::IfThenElse(keeps, free[i], turn[i]);
+}
+
+/// @param told shifts and what R has changed by, a row a number. @param free likewise
+HWY_INLINE HWY_ATTR void BeginLanes(EightFrames& f, double h, std::size_t lane, Block8* told, Block8* free) {
+  Wide q[4], R[3][3], turn[3], free_turn[3];
+  for (std::size_t i = 0; i < 4; ++i) q[i] = Get(f.now.attitude[i], lane);
+  Rotation(q, R);
+  for (std::size_t i = 0; i < 3; ++i) {
+    Put(Get(f.now.shift[i], lane), told[i], lane);
+    for (std::size_t j = 0; j < 3; ++j) Put(hn::Sub(R[i][j], Get(f.start[i][j], lane)), told[3 + 3 * i + j], lane);
+    const Wide v = hn::MulAdd(Get(f.loads.left, lane), Get(f.now.v[i], lane), Get(f.loads.gain[i], lane));
+    turn[i] = hn::MulAdd(Get(f.loads.turn_left, lane), Get(f.now.turn[i], lane), Get(f.loads.turn_gain[i], lane));
+    Put(v, f.now.v[i], lane);
+    Put(turn[i], f.now.turn[i], lane);
+    Put(hn::Mul(Get(f.root_mass, lane), v), free[i], lane);
+  }
+  FreeTurn(f, h, R, turn, lane, free_turn);
+  for (std::size_t i = 0; i < 3; ++i) {
+    Put(free_turn[i], f.now.free_turn[i], lane);
+    Put(free_turn[i], free[3 + i], lane);
+  }
+}
+
+HWY_ATTR void BeginFrames(const FrameArrays& all) {
+  for (std::size_t g = 0; g < all.count; ++g) {
+    EightFrames& f = all.frames[g];
+    Block8 told[12], free[8];
+    for (std::size_t lane = 0; lane < kFramesAtOnce; lane += kDoubles) BeginLanes(f, all.length, lane, told, free);
+    for (std::size_t l = 0; l < kFramesAtOnce && f.first[l] >= 0; ++l) {
+      FrameShift& shift = all.shifts[kFramesAtOnce * g + l];
+      for (std::size_t i = 0; i < 3; ++i) shift.shift[i] = told[i].v[l];
+      for (std::size_t i = 0; i < 9; ++i) shift.turned[i] = told[3 + i].v[l];
+      for (std::size_t i = 0; i < 8; ++i) {
+        all.free[f.first[l]].v[i] = free[i].v[l];
+        all.motion[f.first[l]].v[i] = free[i].v[l] + all.answers[f.first[l]].v[i];
+      }
+    }
+  }
+}
+
+/// @param change, push of the coordinates, a row a number
+HWY_INLINE HWY_ATTR void EndLanes(EightFrames& f, double h, std::size_t lane, const Block8* change,
+                                  const Block8* push) {
+  const Doubles d;
+  const Wide length = hn::Set(d, h), per_root = Get(f.per_root, lane);
+  const auto is_free = hn::Gt(per_root, hn::Zero(d));
+  Wide y[3], r[3], turned[4], before[4], after[4];
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Wide by = Get(change[3 + i], lane);
+    Put(hn::Add(Get(f.now.turn[i], lane), by), f.now.turn[i], lane);
+    y[i] = hn::Mul(length, hn::Add(hn::Add(Get(f.now.free_turn[i], lane), by), Get(push[3 + i], lane)));
+    const Wide v = hn::MulAdd(per_root, Get(change[i], lane), Get(f.now.v[i], lane));
+    const Wide speed = hn::MulAdd(per_root, Get(push[i], lane), v);
+    Put(v, f.now.v[i], lane);
+    const Wide shift = Get(f.now.shift[i], lane);
+    Put(hn::IfThenElse(is_free, hn::MulAdd(length, speed, shift), shift), f.now.shift[i], lane);
+  }
+  Multiply(f.turn_scale, true, y, lane, r);
+  Turned(r, turned);
+  for (std::size_t i = 0; i < 4; ++i) before[i] = Get(f.now.attitude[i], lane);
+  Product(turned, before, after);
+  Wide square = hn::Mul(after[0], after[0]);
+  for (std::size_t i = 1; i < 4; ++i) square = hn::MulAdd(after[i], after[i], square);
+  const Wide norm = hn::Sqrt(square);
+  for (std::size_t i = 0; i < 4; ++i) {
+    Put(turned[i], f.now.turned[i], lane);
+    Put(hn::IfThenElse(is_free, hn::Div(after[i], norm), before[i]), f.now.attitude[i], lane);
+  }
+}
+
+HWY_ATTR void EndFrames(const FrameArrays& all, bool pushed) {
+  for (std::size_t g = 0; g < all.count; ++g) {
+    EightFrames& f = all.frames[g];
+    Block8 change[8], push[8];
+    for (std::size_t l = 0; l < kFramesAtOnce && f.first[l] >= 0; ++l)
+      for (std::size_t i = 0; i < 8; ++i) {
+        const float by = all.motion[f.first[l]].v[i] - all.free[f.first[l]].v[i];
+        all.answers[f.first[l]].v[i] = by;
+        change[i].v[l] = by;
+        push[i].v[l] = pushed ? all.pushes[kFramesAtOnce * g + l].v[i] : 0.0f;
+      }
+    for (std::size_t lane = 0; lane < kFramesAtOnce; lane += kDoubles) EndLanes(f, all.length, lane, change, push);
+  }
+}
+
+}  // namespace limber::internal::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace limber::internal {
+
+HWY_EXPORT(BeginFrames);
+HWY_EXPORT(EndFrames);
+
+void begin_frames(const FrameArrays& all) { HWY_DYNAMIC_DISPATCH(BeginFrames)(all); }
+
+void end_frames(const FrameArrays& all, bool pushed) { HWY_DYNAMIC_DISPATCH(EndFrames)(all, pushed); }
+
+}  // namespace limber::internal
+#endif
