@@ -1,5 +1,8 @@
 #include "frame_kernels.h"
 
+#include <limits>
+#include <numbers>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "game/frame_kernels.cpp"
 // Arrays of vectors, as in sweep_kernels.cpp.
@@ -71,7 +74,7 @@ HWY_INLINE HWY_ATTR void Product(const Wide* a, const Wide* b, Wide* to) {
 
 /// c₀ + c₁ x + … of the series 1/first! − x/(first + 2)! + …
 HWY_INLINE HWY_ATTR Wide Series(double first, Wide x) {
-  constexpr int kTerms = 10;
+  constexpr int kTerms = 8;  // round-off up to 1
   const Doubles d;
   const Wide one = hn::Set(d, 1.0);
   Wide sum = one;
@@ -82,10 +85,25 @@ HWY_INLINE HWY_ATTR Wide Series(double first, Wide x) {
   return sum;
 }
 
-/// Quaternions of rotation vectors: those of their quarters, by the series of sine and cosine, squared twice. To
-/// round-off up to 8 rad.
-HWY_INLINE HWY_ATTR void Turned(const Wide* r, Wide* q) {
+/// The same rotations, by 2π at most. Of angles beyond 1e16 nothing is known but round-off, which the bounds keep
+/// there.
+HWY_INLINE HWY_ATTR void TakeOffWholeTurns(Wide* r) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
   const Doubles d;
+  Wide square = hn::Mul(r[0], r[0]);
+  for (std::size_t i = 1; i < 3; ++i) square = hn::MulAdd(r[i], r[i], square);
+  const Wide angle = hn::Sqrt(square), two_turns = hn::Set(d, 2.0 * kTurn);
+  const Wide rest = hn::NegMulAdd(hn::Round(hn::Div(angle, two_turns)), two_turns, angle);
+  const Wide bounded = hn::Max(hn::Set(d, -kTurn), hn::Min(rest, hn::Set(d, kTurn)));
+  const Wide part = hn::Div(bounded, hn::Max(angle, hn::Set(d, std::numeric_limits<double>::min())));
+  for (std::size_t i = 0; i < 3; ++i) r[i] = hn::Mul(part, r[i]);
+}
+
+/// Quaternions of rotation vectors, which become no longer than 2π: those of their quarters, by the series of sine and
+/// cosine, squared twice.
+HWY_INLINE HWY_ATTR void Turned(Wide* r, Wide* q) {
+  const Doubles d;
+  TakeOffWholeTurns(r);
   Wide quarter[3], square = hn::Zero(d);
   for (std::size_t i = 0; i < 3; ++i) {
     quarter[i] = hn::Mul(hn::Set(d, 0.125), r[i]);
