@@ -15,18 +15,10 @@
 
 #include "cpu_time.h"
 #include "grounded_world.h"
+#include "joint_parts.h"
 
 namespace limber::testing {
 namespace {
-
-/// Nothing ever touches: what is timed is joints.
-struct NoContacts final : ContactSource {
-  void add_body(Index, const BodyGeometry&, const CollisionFilter&) override {}
-  void remove_body(Index) override {}
-  void set_filter(Index, const CollisionFilter&) override {}
-  void exclude_pair(Index, Index, bool) override {}
-  void find_contacts(const ContactQuery&, std::vector<ContactPoint>& contacts, Jobs&) override { contacts.clear(); }
-};
 
 constexpr ContactOptions kGame{.solver = ContactSolver::kGame, .small_steps = {8}};
 
@@ -288,17 +280,11 @@ void grid() {
   }
 }
 
-int run(const std::string& part) {
-  const std::pair<const char*, void (*)()> parts[] = {
-      {"chains", chains}, {"ends", ends}, {"figures", figures}, {"grid", grid}};
-  bool any = false;
-  for (const auto& [name, print] : parts)
-    if (part.empty() || part == name) any = true, print(), std::printf("\n");
-  if (!any) std::fprintf(stderr, "joint_chains: \"%s\", expected chains, ends, figures or grid\n", part.c_str());
-  return any ? 0 : 2;
-}
-
 }  // namespace
 }  // namespace limber::testing
 
-int main(int argc, char** argv) { return limber::testing::run(argc > 1 ? argv[1] : ""); }
+int main(int count, char** arguments) {
+  using namespace limber::testing;
+  return print_parts("joint_chains", {{"chains", chains}, {"ends", ends}, {"figures", figures}, {"grid", grid}},
+                     count > 1 ? arguments[1] : "");
+}

@@ -12,20 +12,12 @@
 
 #include "cpu_time.h"
 #include "grounded_world.h"
+#include "joint_parts.h"
 #include "limber/precompute/bake.h"
 #include "tet_box.h"
 
 namespace limber::testing {
 namespace {
-
-/// Nothing ever touches.
-struct NoContacts final : ContactSource {
-  void add_body(Index, const BodyGeometry&, const CollisionFilter&) override {}
-  void remove_body(Index) override {}
-  void set_filter(Index, const CollisionFilter&) override {}
-  void exclude_pair(Index, Index, bool) override {}
-  void find_contacts(const ContactQuery&, std::vector<ContactPoint>& contacts, Jobs&) override { contacts.clear(); }
-};
 
 const char* name_of(ContactSolver solver) { return solver == ContactSolver::kGame ? "game" : "exact"; }
 
@@ -310,17 +302,11 @@ void princeton() {
     }
 }
 
-int run(const std::string& part) {
-  const std::pair<const char*, void (*)()> parts[] = {
-      {"tops", tops}, {"long", many_steps}, {"bend", bend}, {"princeton", princeton}};
-  bool any = false;
-  for (const auto& [name, print] : parts)
-    if (part.empty() || part == name) any = true, print(), std::printf("\n");
-  if (!any) std::fprintf(stderr, "joint_laws: \"%s\", expected tops, long, bend or princeton\n", part.c_str());
-  return any ? 0 : 2;
-}
-
 }  // namespace
 }  // namespace limber::testing
 
-int main(int count, char** arguments) { return limber::testing::run(count > 1 ? arguments[1] : ""); }
+int main(int count, char** arguments) {
+  using namespace limber::testing;
+  return print_parts("joint_laws", {{"tops", tops}, {"long", many_steps}, {"bend", bend}, {"princeton", princeton}},
+                     count > 1 ? arguments[1] : "");
+}
