@@ -6,21 +6,15 @@
 #include <vector>
 
 #include "limber/collision/broad_phase.h"
+#include "limber/core/mixed_bits.h"
 #include "limber/dynamics/contact_source.h"
 
 namespace limber::internal {
 
-/// A bijection that spreads every bit over all (the finaliser of Steele, Lea and Flood's SplitMix, 2014).
-inline std::uint64_t mixed(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
-
 /// Different for each pair; for one pair as different as the features' own.
 inline std::uint64_t contact_id(const BodyPair& pair, std::uint64_t features) {
   const auto key = static_cast<std::uint64_t>(pair.a) << 32 | static_cast<std::uint32_t>(pair.b);
-  return mixed(features ^ mixed(key + 0x9e3779b97f4a7c15u));
+  return mixed_bits(features ^ mixed_bits(key + 0x9e3779b97f4a7c15u));
 }
 
 /// Names the contacts from `first` on, all of one pair, which have the ids of their features, and sorts them by id.

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <utility>
 
+#include "limber/core/mixed_bits.h"
 #include "limber/mesh/closest_point.h"
 #include "limber/sound/contact_time.h"
 #include "limber/sound/radiation.h"
@@ -85,16 +86,13 @@ class StepOfBlows {
   }
 
  private:
-  /// Even numbers in [0, 1) that follow from two [Steele and others, Fast splittable pseudorandom number generators,
-  /// 2014].
+  /// Even numbers in [0, 1) that follow from two.
   class Dice {
    public:
     Dice(std::uint64_t a, std::uint64_t b) : state_(a * 0x9e3779b97f4a7c15u + b) {}
     double roll() {
-      std::uint64_t z = state_ += 0x9e3779b97f4a7c15u;
-      z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-      z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-      return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+      state_ += 0x9e3779b97f4a7c15u;
+      return static_cast<double>(mixed_bits(state_) >> 11) * 0x1p-53;
     }
 
    private:
