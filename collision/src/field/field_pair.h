@@ -30,10 +30,11 @@ struct FieldView {
   bool apart() const;
   Vec3f placed(const Vec3f& p) const { return turn * p + shift; }
   Vec3f turned_back(const Vec3f& direction) const { return turn.transpose() * direction; }
+  /// What the turn is expected to change by.
+  auto turning() const { return Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(&query.turn[0][0]); }
   /// How a vertex of mine is expected to move in the other's frame.
   Vec3f motion(Index v) const {
-    return Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(&query.turn[0][0]) * mine->vertex(v) +
-           Eigen::Map<const Vec3f>(query.shift) + turn * mine->swing(v);
+    return turning() * mine->vertex(v) + Eigen::Map<const Vec3f>(query.shift) + turn * mine->swing(v);
   }
 };
 

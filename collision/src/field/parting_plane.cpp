@@ -18,10 +18,9 @@ struct Look {
   float fall = 0.0f;  // of one of them along the direction, m
 
   Look(const FieldView& b_in_a, const Vec3f& n) {
-    using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
     const FieldQuery& query = b_in_a.query;
     const Vec3f down = b_in_a.turned_back(-n);
-    const Vec3f then = down - Eigen::Map<const RowMajor>(&query.turn[0][0]).transpose() * n;
+    const Vec3f then = down - b_in_a.turning().transpose() * n;
     for (int axis = 0; axis < 3; ++axis) {
       of_a.now[axis] = of_a.then[axis] = n[axis];
       of_b.now[axis] = down[axis], of_b.then[axis] = then[axis];
@@ -62,14 +61,14 @@ bool part(FieldView& a_in_b, FieldView& b_in_a, float reach) {
   const float enough = reach + noise + query.curve;
   Vec3f nearest = middle(*b_in_a.other) - b_in_a.placed(middle(*b_in_a.mine)), last = Vec3f::Zero();
   float best = -std::numeric_limits<float>::infinity();
-  for (int i = 0; i < collision_tuning().field.looks_apart; ++i) {
+  const FieldTuning& tuning = collision_tuning().field;
+  for (int i = 0; i < tuning.looks_apart; ++i) {
     const float length = nearest.norm();
     if (!(length > noise)) break;
     const Look look(b_in_a, nearest / length);
     const int end = look.gap(1) < look.gap(0) ? 1 : 0;
     if (look.gap(end) > best) best = look.gap(end), look.leave_planes(reach, a_in_b, b_in_a);
-    constexpr float kNoBetter = 0.98f;  // of the distance: decides time alone
-    if (best > enough || (i > 0 && best >= kNoBetter * length)) break;
+    if (best > enough || (i > 0 && best >= static_cast<float>(tuning.looked_enough) * length)) break;
     const Vec3 next = look.between(b_in_a, end).cast<double>();
     const TrianglePoints corners{i > 0 ? Vec3(nearest.cast<double>()) : next, i > 0 ? Vec3(last.cast<double>()) : next,
                                  next};
