@@ -48,16 +48,13 @@ def answer(kind: str, function: Any, *arguments: Any) -> Any:
 
 class Answer:
     """Where the same question is answered again and again, of a world, which one thread at a time uses. `members`: paths of
-    vectors in the struct."""
+    vectors in the struct, which `copy` makes arrays of: (3,), or (4,) of a quaternion."""
 
     def __init__(self, kind: str, **members: Sequence[str]) -> None:
         self.pointer = ffi.new(kind + "*")
-        self._vectors = {name: np.frombuffer(ffi.buffer(self.pointer), np.float64, 4 if path[-1] == "q" else 3, ffi.offsetof(kind, *path))
-                         for name, path in members.items()}
-
-    def vector(self, name: str) -> np.ndarray:
-        """(3,), or (4,) of a quaternion; a copy"""
-        return self._vectors[name].copy()
+        self.memory = ffi.buffer(self.pointer)
+        self.copy = {name: np.frombuffer(self.memory, np.float64, 4 if path[-1] == "q" else 3, ffi.offsetof(kind, *path)).copy
+                     for name, path in members.items()}
 
 
 def create(kind: str, function: Any, *arguments: Any) -> Any:
@@ -86,7 +83,7 @@ def view(pointer: Any, count: int, dtype: Any, owner: Optional[object]) -> np.nd
 def vector(v: Sequence[float]) -> tuple[float, float, float]:
     """Three numbers, as limber_vec3 takes them."""
     x, y, z = v
-    return float(x), float(y), float(z)
+    return x, y, z
 
 
 def array3(v: Any) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import struct
 from typing import Any, Callable, Iterable, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
@@ -70,35 +71,46 @@ class Hit(NamedTuple):
     """m"""
 
 
+_SURFACES = {lib.LIMBER_SURFACE_COLLISION: "collision", lib.LIMBER_SURFACE_RENDER: "render"}
+
+
 def _point(at: Union[int, Point]) -> tuple[int, int, Sequence[float]]:
     p = at if isinstance(at, Point) else Point(int(at))
     return word("LIMBER_SURFACE_", p.surface), p.triangle, list(p.weights)
+
+
+_HIT = struct.Struct("@2I?0dIi3d48x2d")
+"""limber_hit without position, normal and user_data"""
+
+
+def _key(id: Any) -> tuple[int, int]:
+    """An id of its own, in whose place C takes the pair: `id` may be in a list's memory."""
+    return id.index, id.generation
 
 
 class _Named:
     """Something that an id names in a world."""
 
     _kind = ""
-    _pointer_type: Any = None
 
-    def __init__(self, world: World, id: Any) -> None:
+    def __init__(self, world: World, id: tuple[int, int]) -> None:
         self._world = world
-        self._id = ffi.new(self._pointer_type, id)[0]  # of its own: `id` may be in a list's memory
+        self._id = id
 
     def __eq__(self, other: object) -> bool:
         return (isinstance(other, _Named) and type(other) is type(self) and other._world is self._world
-                and (other._id.index, other._id.generation) == (self._id.index, self._id.generation))
+                and other._id == self._id)
 
     def __hash__(self) -> int:
-        return hash((self._kind, self._id.index, self._id.generation))
+        return hash((self._kind, self._id))
 
     def __repr__(self) -> str:
-        return f"<limber.{type(self).__name__} {self._id.index} of {self._world!r}>"
+        return f"<limber.{type(self).__name__} {self.index} of {self._world!r}>"
 
     @property
     def index(self) -> int:
         """Number in the world, which one that comes later may get again."""
-        return self._id.index
+        return self._id[0]
 
     @property
     def exists(self) -> bool:
@@ -124,7 +136,6 @@ class Body(_Named):
     """A body of a world; of static bodies and sensors only what every id has."""
 
     _kind = "body"
-    _pointer_type = ffi.typeof("limber_body_id*")
 
     def _state(self) -> Answer:
         state = self._world._body_state
@@ -134,22 +145,22 @@ class Body(_Named):
     @property
     def position(self) -> np.ndarray:
         """(3,): the body's origin, its centre of mass, world, m"""
-        return self._state().vector("position")
+        return self._state().copy["position"]()
 
     @property
     def rotation(self) -> np.ndarray:
         """(4,): unit quaternion (w, x, y, z) from body to world axes"""
-        return self._state().vector("rotation")
+        return self._state().copy["rotation"]()
 
     @property
     def velocity(self) -> np.ndarray:
         """(3,): of the body's origin, world, m/s"""
-        return self._state().vector("velocity")
+        return self._state().copy["velocity"]()
 
     @property
     def angular_velocity(self) -> np.ndarray:
         """(3,), world, rad/s"""
-        return self._state().vector("angular_velocity")
+        return self._state().copy["angular_velocity"]()
 
     @property
     def amplitudes(self) -> np.ndarray:
@@ -252,8 +263,8 @@ class Body(_Named):
         """Takes hold of a point where it is now. Options: max_force (N), stiffness (N/m), damping (N·s/m)."""
         o = ffi.new("limber_handle_options*", lib.limber_default_handle_options())
         chosen(o, options, "a handle")
-        return Handle(self._world, answer("limber_handle_id", lib.limber_world_add_handle, self._world._pointer,
-                                          self._id, _point(at), o)[0])
+        return Handle(self._world, _key(answer("limber_handle_id", lib.limber_world_add_handle, self._world._pointer,
+                                          self._id, _point(at), o)[0]))
 
     def vertices(self, out: Optional[np.ndarray] = None, normals: Optional[np.ndarray] = None,
                  interpolation: float = 1.0) -> np.ndarray:
@@ -287,7 +298,6 @@ class Handle(_Named):
     """A point of a body that is held, dragged or pulled: `Body.hold`."""
 
     _kind = "handle"
-    _pointer_type = ffi.typeof("limber_handle_id*")
 
     def move_to(self, position: Sequence[float], velocity: Sequence[float] = (0, 0, 0)) -> None:
         """Where the point is wanted at the end of the coming step, world, m, and how it goes on from there, m/s."""
@@ -316,7 +326,6 @@ class Joint(_Named):
     """A joint between two bodies: `World.add_joint`."""
 
     _kind = "joint"
-    _pointer_type = ffi.typeof("limber_joint_id*")
 
     def _state(self) -> Any:
         return answer("limber_joint_state", lib.limber_world_joint_state, self._world._pointer, self._id)
@@ -390,7 +399,7 @@ class World:
 
     def _ask(self, function: Any, *arguments: Any) -> np.ndarray:
         check(function(self._pointer, *arguments, self._vector.pointer))
-        return self._vector.vector("vector")
+        return self._vector.copy["vector"]()
 
     def __repr__(self) -> str:
         return f"<limber.World of {lib.limber_world_body_count(self._pointer)} bodies at {self.time:g} s>"
@@ -441,8 +450,8 @@ class World:
 
     def add_sensor(self, shape: Shape, position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (1, 0, 0, 0)) -> Body:
         """A convex shape that tells which bodies it overlaps (`inside`), and pushes none."""
-        return Body(self, answer("limber_body_id", lib.limber_world_add_sensor, self._pointer, shape._pointer,
-                                 transform(position, rotation), lib.limber_default_filter())[0])
+        return Body(self, _key(answer("limber_body_id", lib.limber_world_add_sensor, self._pointer, shape._pointer,
+                                 transform(position, rotation), lib.limber_default_filter())[0]))
 
     def _add(self, function: Any, what: tuple[Any, ...], placement: dict[str, Any]) -> Body:
         given = dict(placement)
@@ -461,25 +470,25 @@ class World:
             if name in given:
                 given[name] = vector(given[name])
         chosen(p, given, "a placement")
-        return Body(self, answer("limber_body_id", function, self._pointer, *what, p)[0])
+        return Body(self, _key(answer("limber_body_id", function, self._pointer, *what, p)[0]))
 
     @property
     def bodies(self) -> list[Body]:
         """All there are, static ones and sensors too."""
-        return [Body(self, id) for id in self._list("limber_body_id", lib.limber_world_list_bodies)]
+        return [Body(self, _key(id)) for id in self._list("limber_body_id", lib.limber_world_list_bodies)]
 
     @property
     def joints(self) -> list[Joint]:
-        return [Joint(self, id) for id in self._list("limber_joint_id", lib.limber_world_list_joints)]
+        return [Joint(self, _key(id)) for id in self._list("limber_joint_id", lib.limber_world_list_joints)]
 
     @property
     def handles(self) -> list[Handle]:
-        return [Handle(self, id) for id in self._list("limber_handle_id", lib.limber_world_list_handles)]
+        return [Handle(self, _key(id)) for id in self._list("limber_handle_id", lib.limber_world_list_handles)]
 
     def body_at(self, index: int) -> Optional[Body]:
         """The body of an index, as an event has it; None: it has been removed."""
         id = lib.limber_world_body_at(self._pointer, index)
-        return Body(self, id) if id.generation else None
+        return Body(self, _key(id)) if id.generation else None
 
     def poses(self, bodies: Sequence[Body], interpolation: float = 1.0) -> np.ndarray:
         """(n, 7): quaternions (w, x, y, z) and positions (m) of bodies between the last two states, in one call."""
@@ -491,7 +500,7 @@ class World:
 
     def inside(self, sensor: Body) -> list[Body]:
         """Bodies in a sensor, as of the last step."""
-        return [Body(self, id) for id in self._list("limber_body_id", lib.limber_world_list_inside, sensor._id)]
+        return [Body(self, _key(id)) for id in self._list("limber_body_id", lib.limber_world_list_inside, sensor._id)]
 
     def _list(self, kind: str, function: Any, *arguments: Any) -> Any:
         count = answer("size_t", function, self._pointer, *arguments, ffi.NULL, 0)
@@ -524,8 +533,8 @@ class World:
             o.euler[i] = tuple(limits)
         chosen(o, given, "a joint")
         world = ffi.new("limber_body_id*")[0]
-        return Joint(self, answer("limber_joint_id", lib.limber_world_add_joint, self._pointer,
-                                  world if a is None else a._id, world if b is None else b._id, o)[0])
+        return Joint(self, _key(answer("limber_joint_id", lib.limber_world_add_joint, self._pointer,
+                                  world if a is None else a._id, world if b is None else b._id, o)[0]))
 
     def add_machine(self, asset: Asset, position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (1, 0, 0, 0),
                     velocity: Sequence[float] = (0, 0, 0), angular_velocity: Sequence[float] = (0, 0, 0), tied: bool = True,
@@ -543,12 +552,12 @@ class World:
         bodies = ffi.new("limber_body_id[]", lib.limber_asset_body_count(asset._pointer))
         joints = ffi.new("limber_joint_id[]", lib.limber_asset_joint_count(asset._pointer))
         check(lib.limber_world_add_machine(self._pointer, asset._pointer, p, bodies, joints))
-        return Machine([Body(self, id) for id in bodies], [Joint(self, id) if id.generation else None for id in joints])
+        return Machine([Body(self, _key(id)) for id in bodies], [Joint(self, _key(id)) if id.generation else None for id in joints])
 
     @property
     def broken_joints(self) -> list[Joint]:
         """Joints that broke in the last step; they exist no more."""
-        return [Joint(self, event.joint) for event in self._list("limber_joint_break", lib.limber_world_joint_breaks)]
+        return [Joint(self, _key(event.joint)) for event in self._list("limber_joint_break", lib.limber_world_joint_breaks)]
 
     def ignore_collision(self, a: Body, b: Body, ignore: bool = True) -> None:
         """Whether two bodies have no contacts with each other."""
@@ -630,31 +639,37 @@ class World:
     def cast_ray(self, origin: Sequence[float], way: Sequence[float], mask: int = ALL_LAYERS,
                  ignore: Iterable[Body] = ()) -> Optional[Hit]:
         """The first place that a ray from `origin` along `way` (m, as long as the ray) meets. `mask`: layers that may answer."""
-        return self._first(lib.limber_world_cast_ray, vector(origin), vector(way), mask, ignore)
+        filter, _accepts = self._filter(mask, ignore)
+        check(lib.limber_world_cast_ray(self._pointer, vector(origin), vector(way), filter, self._found.pointer, self._hit.pointer))
+        return self._first()
 
     def cast_shape(self, shape: Shape, position: Sequence[float], way: Sequence[float],
                    rotation: Sequence[float] = (1, 0, 0, 0), mask: int = ALL_LAYERS,
                    ignore: Iterable[Body] = ()) -> Optional[Hit]:
         """Where a sphere, capsule, box or hull first touches that is moved along `way` without turning."""
-        return self._first(lib.limber_world_cast_shape, shape._pointer, transform(position, rotation), vector(way), mask,
-                           ignore)
+        filter, _accepts = self._filter(mask, ignore)
+        check(lib.limber_world_cast_shape(self._pointer, shape._pointer, transform(position, rotation), vector(way), filter,
+                                          self._found.pointer, self._hit.pointer))
+        return self._first()
 
     def nearest_point(self, point: Sequence[float], max_distance: float, mask: int = ALL_LAYERS,
                       ignore: Iterable[Body] = ()) -> Optional[Hit]:
         """The nearest place of any surface, no farther than `max_distance`, m."""
-        return self._first(lib.limber_world_nearest_point, vector(point), max_distance, mask, ignore)
+        filter, _accepts = self._filter(mask, ignore)
+        check(lib.limber_world_nearest_point(self._pointer, vector(point), max_distance, filter, self._found.pointer, self._hit.pointer))
+        return self._first()
 
     def find_overlaps(self, shape: Shape, position: Sequence[float], rotation: Sequence[float] = (1, 0, 0, 0),
                       mask: int = ALL_LAYERS, ignore: Iterable[Body] = ()) -> list[Body]:
         """Bodies that a sphere, capsule, box or hull touches or lies in."""
         filter, _accepts = self._filter(mask, ignore)
-        return [Body(self, id) for id in self._list("limber_body_id", lib.limber_world_find_overlaps, shape._pointer,
+        return [Body(self, _key(id)) for id in self._list("limber_body_id", lib.limber_world_find_overlaps, shape._pointer,
                                                     transform(position, rotation), filter)]
 
     def _filter(self, mask: int, ignore: Iterable[Body]) -> tuple[Any, Any]:
-        ignored = {body._id.index for body in ignore}
-        if not ignored and mask == ALL_LAYERS:
+        if not ignore and mask == ALL_LAYERS:
             return ffi.NULL, None
+        ignored = {body.index for body in ignore}
         filter = ffi.new("limber_query_filter*", lib.limber_default_query_filter())
         filter.mask = mask
         if not ignored:
@@ -663,18 +678,12 @@ class World:
         filter.accepts = accepts
         return filter, accepts  # the second is kept as long as the first is used
 
-    def _first(self, function: Any, *arguments: Any) -> Optional[Hit]:
-        *place, mask, ignore = arguments
-        filter, _accepts = self._filter(mask, ignore)
-        hit = self._hit.pointer
-        found = self._found.pointer
-        check(function(self._pointer, *place, filter, found, hit))
-        if not found[0]:
+    def _first(self) -> Optional[Hit]:
+        if not self._found.pointer[0]:
             return None
-        at = hit.at
-        surface = "render" if at.surface == lib.LIMBER_SURFACE_RENDER else "collision"
-        point = Point(at.triangle, tuple(at.weight), surface) if hit.has_point else None
-        return Hit(Body(self, hit.body), point, self._hit.vector("position"), self._hit.vector("normal"), hit.fraction, hit.distance)
+        index, generation, has_point, surface, triangle, a, b, c, fraction, distance = _HIT.unpack_from(self._hit.memory)
+        point = Point(triangle, (a, b, c), _SURFACES[surface]) if has_point else None
+        return Hit(Body(self, (index, generation)), point, self._hit.copy["position"](), self._hit.copy["normal"](), fraction, distance)
 
     # Rollback
 

@@ -114,7 +114,7 @@ def test_queries_answer_with_bodies(world):
     near = world.add_rigid(limber.Shape.sphere(0.5), position=(2, 0, 1))
     far = world.add_rigid(limber.Shape.sphere(0.5), position=(4, 0, 1))
     hit = world.cast_ray((0, 0, 1), (10, 0, 0))
-    assert hit.body == near and hit.distance == pytest.approx(1.5, abs=1e-6)
+    assert hit.body == near and hit.distance == pytest.approx(1.5, abs=1e-6) and hit.fraction == pytest.approx(0.15, abs=1e-6)
     assert hit.normal == pytest.approx((-1, 0, 0), abs=1e-6)
     assert world.cast_ray((0, 0, 1), (10, 0, 0), ignore=[near]).body == far
     assert world.cast_ray((0, 0, 1), (-10, 0, 0)) is None
@@ -221,6 +221,7 @@ def test_a_belt_carries_a_table_of_five_parts(world):
     assert hit is None or hit.body == table  # it is carried away
     hit = world.cast_ray(table.position + (0, 0, 3), (0, 0, -4))
     assert hit.body == table and hit.point is not None and hit.position[2] == pytest.approx(0.6, abs=2e-3)
+    assert table.point_position(hit.point) == pytest.approx(hit.position, abs=1e-7)
 
 
 def test_an_asset_is_written_and_read(tmp_path):
