@@ -16,6 +16,7 @@
 #include "precompute_input.h"
 #include "precompute_report.h"
 #include "program.h"
+#include "slepc_engine.h"
 
 namespace limber::tools {
 namespace {
@@ -162,8 +163,16 @@ void precompute(Program& program, const PrecomputeArguments& a) {
   choose_elements(a, program.report().contains("surface"), input.mesh.has_mid_edge_nodes(), options);
 
   program.progress().stage("modes");
-  if (!a.slice.band.empty()) return precompute_slice(program, a, input, options);
   TbbJobs jobs;
+  std::string slices;  // of limber-eigen
+  if (a.slice.bodies || a.slice.by_processes()) {
+    const std::string bodies = bake_eigenproblems(input, options, program.warnings(), jobs);
+    if (a.slice.bodies) return program.write_file(a.output, bodies);
+    slices = stopwatch.time("eigen", [&] { return run_limber_eigen(program, a, bodies); });
+    if (!a.slice.band.empty()) return fs::rename(slices, a.output);
+    options.analysis.slices = read_slices(slices);
+  }
+  if (!a.slice.band.empty()) return precompute_slice(program, a, input, options);
   const BakeResult result = bake(input, options, program.warnings(), jobs);
   program.progress().stage("writing");
   const std::string bytes = stopwatch.time("encode", [&] { return asset_bytes(result.asset); });
@@ -179,6 +188,7 @@ void precompute(Program& program, const PrecomputeArguments& a) {
   program.print(stage_line(seconds));
   program.report()["seconds"] = std::move(seconds);
   program.print(fmt::format("{}: {:.2f} MB\n", a.output, 1e-6 * static_cast<double>(bytes.size())));
+  if (!slices.empty()) fs::remove(slices);
 }
 
 }  // namespace

@@ -23,12 +23,13 @@ struct ProgramResult {
   std::string out, err;
 };
 
+/// @param name of a program of limber, or an absolute path
 /// @param folder where the program runs; stdout and stderr pass through files in it, removed afterwards
 /// @param largest_file bytes beyond which no file may grow, as on a disk that fills; none: no limit
 inline ProgramResult run_program(const std::string& name, const std::vector<std::string>& arguments,
                                  const std::filesystem::path& folder, std::optional<rlim_t> largest_file = {}) {
   const auto out = folder / ".stdout", err = folder / ".stderr";
-  const std::string program = std::string(LIMBER_BIN_DIR) + "/" + name;
+  const std::string program = (std::filesystem::path(LIMBER_BIN_DIR) / name).string();
   const pid_t child = ::fork();
   if (child == 0) {
     const auto redirect = [](const std::filesystem::path& path, int to) {

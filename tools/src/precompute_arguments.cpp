@@ -86,6 +86,18 @@ void declare_slice_options(CLI::App& app, PrecomputeArguments& a) {
                  "take the modes of these slices, which follow each other from 0 Hz on, made of the same mesh with the "
                  "same options; repeatable")
       ->type_name("FILE");
+  app.add_option(
+         "--engine", a.slice.engine,
+         "what computes the modes; slepc: limber-eigen, by mpirun; lobpcg: the same without a factor and without "
+         "the proof that no mode is missed")
+      ->type_name("NAME")
+      ->check(CLI::IsMember({"arpack", "slepc", "lobpcg"}))
+      ->capture_default_str();
+  app.add_option("--processes", a.slice.processes, "of limber-eigen")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str();
+  app.add_flag("--bodies", a.slice.bodies, "write to --output what limber-eigen computes slices from, for --merge");
 }
 
 void declare_geometry_options(CLI::App& app, PrecomputeArguments& a) {
@@ -358,6 +370,10 @@ void choose_elements(const PrecomputeArguments& a, bool made_here, bool has_mid_
 void read_slices_of(Program& program, const PrecomputeArguments& a, bool modes_given, BakeOptions& options) {
   if (a.slice.of != 1 && a.slice.band.empty()) throw InvalidArgument("--of is for --slice, which is not given");
   if (!a.slice.band.empty() && !a.slice.merge.empty()) throw InvalidArgument("--slice and --merge exclude each other");
+  if (a.slice.by_processes() && !a.slice.merge.empty())
+    throw InvalidArgument("--engine and --merge exclude each other");
+  if (!a.slice.by_processes() && a.slice.processes != 1)
+    throw InvalidArgument("--processes is for --engine slepc and lobpcg, which are not given");
   std::map<std::string, int> modes;  // of each body
   for (const std::string& file : a.slice.merge) {
     program.add_input(file);
@@ -383,8 +399,8 @@ void check_assembly(const PrecomputeArguments& a) {
   if (is_one &&
       !(a.geometry.fixes.empty() && a.geometry.render_surface.empty() && a.geometry.collision_surface.empty()))
     throw InvalidArgument("--fix, --render-surface and --collision-surface are for single bodies, not for assemblies");
-  if (is_one && !(a.slice.band.empty() && a.slice.merge.empty()))
-    throw InvalidArgument("--slice and --merge are for single meshes, not for assemblies");
+  if (is_one && !(a.slice.band.empty() && a.slice.merge.empty() && !a.slice.by_processes() && !a.slice.bodies))
+    throw InvalidArgument("--slice, --merge, --engine and --bodies are for single meshes, not for assemblies");
   if (is_one && !a.modal.frequency_error.empty())
     throw InvalidArgument("--frequency-error is for single surfaces, not for assemblies");
   if (a.assembly.options.free && !a.assembly.options.ground.empty())

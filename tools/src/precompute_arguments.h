@@ -57,11 +57,16 @@ struct AssemblyArguments {
   std::string scene;
 };
 
-/// Of a spectrum that is computed in parts.
+/// Of a spectrum that is computed in parts, or elsewhere.
 struct SliceArguments {
   std::vector<double> band;  ///< Hz; empty: none
   int of = 1;
   std::vector<std::string> merge;  ///< files
+  bool bodies = false;             ///< written for limber-eigen instead
+  std::string engine = "arpack";
+  int processes = 1;  ///< of limber-eigen
+
+  bool by_processes() const { return engine != "arpack"; }
 };
 
 struct PrecomputeArguments {

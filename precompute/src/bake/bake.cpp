@@ -146,4 +146,11 @@ std::vector<SpectrumSlice> bake_slices(const BakeInput& input, const BakeOptions
   return slices;
 }
 
+std::string bake_eigenproblems(const BakeInput& input, const BakeOptions& options, Warnings& warnings, Jobs& jobs) {
+  const Bodies made = make_bodies(input, options, warnings);
+  std::vector<EigenproblemInput> bodies;
+  for (const internal::BodyInput& body : made.bodies) bodies.push_back({&body.part.mesh, made.materials, body.fixed});
+  return eigenproblem_bytes(bodies, options.analysis.mass, jobs);
+}
+
 }  // namespace limber

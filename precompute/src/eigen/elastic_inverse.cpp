@@ -14,16 +14,6 @@ constexpr int kMaxRefinements = 8;
 constexpr double kRefined = 1e-12;     // a correction this small, relative to the answer, was the last
 constexpr double kContraction = 0.25;  // a correction must be this much smaller than the one before
 
-/// As many degrees of freedom as N has columns, such that N cannot move without moving them.
-std::vector<Index> choose_pins(const Eigen::MatrixXd& N) {
-  if (N.cols() == 0) return {};
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(N.transpose());
-  const auto& chosen = qr.colsPermutation().indices();
-  std::vector<Index> pins(chosen.data(), chosen.data() + N.cols());
-  std::sort(pins.begin(), pins.end());
-  return pins;
-}
-
 std::vector<Index> all_but(Index size, const std::vector<Index>& left_out) {
   std::vector<Index> all(size), kept;
   std::iota(all.begin(), all.end(), 0);
@@ -43,6 +33,15 @@ std::vector<Index> order_of_kept(const std::vector<Index>& node_order, const std
 }
 
 }  // namespace
+
+std::vector<Index> choose_pins(const Eigen::MatrixXd& N) {
+  if (N.cols() == 0) return {};
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(N.transpose());
+  const auto& chosen = qr.colsPermutation().indices();
+  std::vector<Index> pins(chosen.data(), chosen.data() + N.cols());
+  std::sort(pins.begin(), pins.end());
+  return pins;
+}
 
 Eigen::MatrixXd ScaledProblem::mass_times(const Eigen::Ref<const Eigen::MatrixXd>& X) const {
   return multiply_by_axes(node_mass, X);

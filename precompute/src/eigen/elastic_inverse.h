@@ -64,6 +64,9 @@ class SpectralInverse {
   int solves_ = 0;
 };
 
+/// As many degrees of freedom as N has columns, such that N cannot move without moving them.
+std::vector<Index> choose_pins(const Eigen::MatrixXd& N);
+
 /// K⁺; s = 0 unless K_pin does not factor.
 class ElasticInverse final : public SpectralInverse {
  public:

@@ -3,6 +3,7 @@
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,7 @@ SpectrumSlice read_head(const JsonObject& object) {
                       .of = whole_number(object, "of"),
                       .below_low = whole_number(object, "below_low"),
                       .below_high = whole_number(object, "below_high"),
+                      .counted = object.boolean("counted", true),
                       .problem = object.text("problem"),
                       .nodes = whole_number(object, "nodes")};
   object.finish();
@@ -58,6 +60,13 @@ SpectrumSlice read_head(const JsonObject& object) {
 
 }  // namespace
 
+void FrequencyBand::validate() const {
+  if (low >= 0.0 && low < high && std::isfinite(high)) return;
+  std::ostringstream text;
+  text << "FrequencyBand: from " << low << " to " << high << " Hz, expected 0 <= low < high";
+  throw InvalidArgument(text.str());
+}
+
 std::string slice_bytes(std::span<const SpectrumSlice> slices) {
   nlohmann::ordered_json bodies = nlohmann::ordered_json::array();
   std::string numbers;
@@ -67,6 +76,7 @@ std::string slice_bytes(std::span<const SpectrumSlice> slices) {
                       {"of", slice.of},
                       {"below_low", slice.below_low},
                       {"below_high", slice.below_high},
+                      {"counted", slice.counted},
                       {"problem", slice.problem},
                       {"nodes", slice.nodes}});
     append(slice.eigenvalues, numbers);

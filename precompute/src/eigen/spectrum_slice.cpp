@@ -1,7 +1,6 @@
 #include "limber/precompute/spectrum_slice.h"
 
 #include <cmath>
-#include <sstream>
 
 #include "eigen/blas_threads.h"
 #include "eigen/eigen_body.h"
@@ -12,13 +11,6 @@
 #include "limber/precompute/modal_analysis.h"
 
 namespace limber {
-
-void FrequencyBand::validate() const {
-  if (low >= 0.0 && low < high && std::isfinite(high)) return;
-  std::ostringstream text;
-  text << "FrequencyBand: from " << low << " to " << high << " Hz, expected 0 <= low < high";
-  throw InvalidArgument(text.str());
-}
 
 SpectrumSlice analyse_slice(const TetMesh& mesh, std::span<const Material> materials,
                             std::span<const Index> fixed_nodes, const FrequencyBand& band,

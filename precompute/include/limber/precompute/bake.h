@@ -253,4 +253,8 @@ BakeResult bake(const BakeInput& input, const BakeOptions& options, Warnings& wa
 std::vector<SpectrumSlice> bake_slices(const BakeInput& input, const BakeOptions& options, const FrequencyBand& band,
                                        Warnings& warnings, Jobs& jobs = serial_jobs());
 
+/// eigenproblem_bytes() of the input's bodies. @throws as bake()
+std::string bake_eigenproblems(const BakeInput& input, const BakeOptions& options, Warnings& warnings,
+                               Jobs& jobs = serial_jobs());
+
 }  // namespace limber

@@ -12,7 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "limber/core/types.h"
+#include "limber/core/jobs.h"
+#include "limber/mesh/tet_mesh.h"
+#include "limber/model/material.h"
+#include "limber/precompute/fem.h"
 
 namespace limber {
 
@@ -26,6 +29,7 @@ struct SpectrumSlice {
   FrequencyBand band = {};
   int of = 1;                            ///< slices in all, as the caller was told
   int below_low = 0, below_high = 0;     ///< eigenvalues below the ends, those of zero among them
+  bool counted = true;                   ///< by inertia; else those found, and some may be missing
   std::string problem = {};              ///< SHA-256 of K, M and the free nodes: what a slice fits
   Index nodes = 0;                       ///< of the body
   std::vector<double> eigenvalues = {};  ///< ascending, rad²/s²
@@ -38,5 +42,17 @@ struct SpectrumSlice {
 std::string slice_bytes(std::span<const SpectrumSlice> slices);
 /// @throws InputError naming the file where it is no such file, is cut off or damaged
 std::vector<SpectrumSlice> read_slices(const std::filesystem::path& path);
+
+/// A body for eigenproblem_bytes(); all must outlive the call.
+struct EigenproblemInput {
+  const TetMesh* mesh = nullptr;
+  std::span<const Material> materials;
+  std::span<const Index> fixed_nodes;
+};
+
+/// The file that limber-eigen computes slices from on many processes: mesh, materials, what is fixed and the motions
+/// that deform nothing. K is assembled once to tell by its hash which body it is, and forgotten.
+/// @throws InvalidArgument unless each mesh is one body
+std::string eigenproblem_bytes(std::span<const EigenproblemInput> bodies, MassKind mass, Jobs& jobs = serial_jobs());
 
 }  // namespace limber
