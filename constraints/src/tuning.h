@@ -101,8 +101,6 @@ struct SmallStepTuning {
   float push_share = 0.2f;  ///< of an overlap beyond the slop that a substep undoes. By judgement
   /// m/s and rad/s: what joints are open by as a step begins comes together at this speed. By judgement.
   double recovery_speed = 1.0;
-  /// Modes of a body up to which its pairs are swept eight at a time. [path] The loops have room for so many.
-  std::int32_t most_bundled_modes = 32;
   /// Substeps in which bodies that rebound come together, and in which they part. The gap closes in the first; sweeps
   /// leave 6 % of the speed of a box that lands flat after the second, and a tenth of what is to be given after the
   /// first that parts.

@@ -4,7 +4,8 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "game/bundle_kernels.cpp"
-// Arrays of vectors, as in sweep_kernels.cpp.
+// Arrays of vectors cannot be formed of vectors of a length unknown to the compiler: those machines run the fixed
+// 128-bit code.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #include <hwy/foreach_target.h>
 // foreach_target first
@@ -91,23 +92,22 @@ struct Sides {
   Vector apart[3];    // w
   Vector parted[3];   // Σ of forces, world: what w came by less
   Vector turn[2][3];  // coordinates
-  Vector rate;        // root_a² + root_b²
+  Vector rate[3];     // root_a² + root_b²
 };
 
 HWY_INLINE HWY_ATTR void ReadSides(const PairBundle& bundle, const std::int32_t (*at)[kBundleLanes], const Block8* y,
                                    std::size_t lane, Sides& sides) {
   const Lanes d;
-  sides.rate = hn::Zero(d);
-  for (std::size_t i = 0; i < 3; ++i) sides.apart[i] = sides.parted[i] = hn::Zero(d);
+  for (std::size_t i = 0; i < 3; ++i) sides.apart[i] = sides.parted[i] = sides.rate[i] = hn::Zero(d);
   for (std::size_t s = 0; s < 2; ++s) {
     const float* from[kLanesAtOnce];
     for (std::size_t l = 0; l < kLanesAtOnce; ++l) from[l] = y[at[s][lane + l]].v;
     Vector v[8];
     Gather4(from, 0, v);
     Gather4(from, 4, v + 4);
-    const Vector root = Get(bundle.root[s], lane);
-    sides.rate = hn::MulAdd(root, root, sides.rate);
     for (std::size_t i = 0; i < 3; ++i) {
+      const Vector root = Get(bundle.root[s][i], lane);
+      sides.rate[i] = hn::MulAdd(root, root, sides.rate[i]);
       sides.apart[i] = s == 0 ? hn::Mul(root, v[i]) : hn::NegMulAdd(root, v[i], sides.apart[i]);
       sides.turn[s][i] = v[3 + i];
     }
@@ -127,8 +127,8 @@ HWY_INLINE HWY_ATTR void WriteSides(const PairBundle& bundle, const std::int32_t
     }
     Vector v[8];
     Gather4(from, 0, v);
-    const Vector root = Get(bundle.root[s], lane);
     for (std::size_t i = 0; i < 3; ++i) {
+      const Vector root = Get(bundle.root[s][i], lane);
       v[i] = s == 0 ? hn::MulAdd(root, sides.parted[i], v[i]) : hn::NegMulAdd(root, sides.parted[i], v[i]);
       v[3 + i] = sides.turn[s][i];
     }
@@ -138,20 +138,33 @@ HWY_INLINE HWY_ATTR void WriteSides(const PairBundle& bundle, const std::int32_t
   }
 }
 
-/// The modes of both bodies, in the lanes that have any.
+/// The modes of both bodies, in the lanes that have any: a vector a mode, in the memory of a function or in a bundle's.
+constexpr std::int32_t kModesAtHand = 64;
+struct ModesAtHand {
+  alignas(32) float v[kModesAtHand * kLanesAtOnce];
+};
 struct Modes {
-  Vector y[2][kMostBundledModes];
+  Modes(const BundleArrays& all, const PairBundle& bundle, ModesAtHand& at_hand) {
+    y[0] = bundle.modes[0] + bundle.modes[1] <= kModesAtHand ? at_hand.v : all.room[bundle.room].v;
+    y[1] = y[0] + static_cast<std::size_t>(bundle.modes[0]) * kLanesAtOnce;
+  }
+  float* of(std::size_t side, std::int32_t mode) const {
+    return y[side] + static_cast<std::size_t>(mode) * kLanesAtOnce;
+  }
+  float* y[2];
 };
 
 HWY_INLINE HWY_ATTR void ReadModes(const BundleArrays& all, const PairBundle& bundle, const Block8* y, std::size_t lane,
-                                   Modes& modes) {
+                                   const Modes& modes) {
   for (std::size_t s = 0; s < 2; ++s)
     for (std::int32_t k = 0; 8 * k < bundle.modes[s]; ++k) {
       const float* from[kLanesAtOnce];
       for (std::size_t l = 0; l < kLanesAtOnce; ++l)
         from[l] = y[bundle.blocks[s][lane + l] > k ? bundle.motion[s][lane + l] + 1 + k : all.zeros].v;
-      Gather4(from, 0, modes.y[s] + 8 * k);
-      Gather4(from, 4, modes.y[s] + 8 * k + 4);
+      Vector v[8];
+      Gather4(from, 0, v);
+      Gather4(from, 4, v + 4);
+      for (std::int32_t i = 0; i < 8; ++i) hn::Store(v[i], Lanes(), modes.of(s, 8 * k + i));
     }
 }
 
@@ -161,14 +174,18 @@ HWY_INLINE HWY_ATTR void WriteModes(const PairBundle& bundle, Block8* y, std::si
       float* to[kLanesAtOnce];
       for (std::size_t l = 0; l < kLanesAtOnce; ++l)
         to[l] = bundle.blocks[s][lane + l] > k ? y[bundle.motion[s][lane + l] + 1 + k].v : nullptr;
-      Scatter4(modes.y[s] + 8 * k, to, 0);
-      Scatter4(modes.y[s] + 8 * k + 4, to, 4);
+      Vector v[8];
+      for (std::int32_t i = 0; i < 8; ++i) v[i] = hn::Load(Lanes(), modes.of(s, 8 * k + i));
+      Scatter4(v, to, 0);
+      Scatter4(v + 4, to, 4);
     }
 }
 
 /// All coordinates of both bodies.
 struct Coordinates {
+  Coordinates(const BundleArrays& all, const PairBundle& bundle) : modes(all, bundle, at_hand) {}
   Sides sides;
+  ModesAtHand at_hand;
   Modes modes;
 };
 
@@ -194,15 +211,18 @@ HWY_INLINE HWY_ATTR void AddModes(const PairBundle& bundle, const Block8* rows, 
                                   Vector* u) {
   for (std::size_t s = 0; s < 2; ++s)
     for (std::int32_t i = 0; i < bundle.modes[s]; ++i, rows += 3)
-      for (std::size_t axis = 0; axis < 3; ++axis) u[axis] = hn::MulAdd(Get(rows[axis], lane), modes.y[s][i], u[axis]);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        u[axis] = hn::MulAdd(Get(rows[axis], lane), hn::Load(Lanes(), modes.of(s, i)), u[axis]);
 }
 
 HWY_INLINE HWY_ATTR void MoveModes(const PairBundle& bundle, const Block8* rows, const Vector* by, std::size_t lane,
-                                   Modes& modes) {
+                                   const Modes& modes) {
   for (std::size_t s = 0; s < 2; ++s)
-    for (std::int32_t i = 0; i < bundle.modes[s]; ++i, rows += 3)
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        modes.y[s][i] = hn::MulAdd(by[axis], Get(rows[axis], lane), modes.y[s][i]);
+    for (std::int32_t i = 0; i < bundle.modes[s]; ++i, rows += 3) {
+      Vector y = hn::Load(Lanes(), modes.of(s, i));
+      for (std::size_t axis = 0; axis < 3; ++axis) y = hn::MulAdd(by[axis], Get(rows[axis], lane), y);
+      hn::Store(y, Lanes(), modes.of(s, i));
+    }
 }
 
 /// The row's number for the frames as they are.
@@ -217,7 +237,7 @@ HWY_INLINE HWY_ATTR void MoveSides(const BundleContact& c, std::size_t axes, con
   for (std::size_t i = 0; i < 3; ++i) {
     Vector force = hn::Mul(by[0], Get(c.axes[0][i], lane));
     for (std::size_t axis = 1; axis < axes; ++axis) force = hn::MulAdd(by[axis], Get(c.axes[axis][i], lane), force);
-    sides.apart[i] = hn::MulAdd(sides.rate, force, sides.apart[i]);
+    sides.apart[i] = hn::MulAdd(sides.rate[i], force, sides.apart[i]);
     sides.parted[i] = hn::Add(sides.parted[i], force);
     for (std::size_t s = 0; s < 2; ++s)
       for (std::size_t axis = 0; axis < axes; ++axis)
@@ -335,14 +355,14 @@ HWY_INLINE HWY_ATTR void MakeTurns(const PairBundle& bundle, BundleContact& c, s
 }
 
 /// Products of two of the rows, by frames.
-HWY_INLINE HWY_ATTR Vector FrameProduct(const BundleContact& c, std::size_t x, std::size_t y, Vector rate,
+HWY_INLINE HWY_ATTR Vector FrameProduct(const BundleContact& c, std::size_t x, std::size_t y, const Vector* rate,
                                         std::size_t lane) {
-  Vector along = hn::Zero(Lanes()), sum = along;
+  Vector sum = hn::Zero(Lanes());
   for (std::size_t i = 0; i < 3; ++i) {
-    along = hn::MulAdd(Get(c.axes[x][i], lane), Get(c.axes[y][i], lane), along);
+    sum = hn::MulAdd(hn::Mul(rate[i], Get(c.axes[x][i], lane)), Get(c.axes[y][i], lane), sum);
     for (std::size_t s = 0; s < 2; ++s) sum = hn::MulAdd(Get(c.turn[s][x][i], lane), Get(c.turn[s][y][i], lane), sum);
   }
-  return hn::MulAdd(rate, along, sum);
+  return sum;
 }
 
 /// 1/x; 0 where it is not positive.
@@ -357,7 +377,7 @@ HWY_INLINE HWY_ATTR Vector LargestOf(Vector a, Vector b, Vector off) {
 }
 
 HWY_INLINE HWY_ATTR void MakeMasses(const PairBundle& bundle, BundleContact& c, const Block8* rows, const Modes& shapes,
-                                    Vector rate, std::size_t lane) {
+                                    const Vector* rate, std::size_t lane) {
   constexpr std::size_t kPairs[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
   Vector of[6];
   for (std::size_t i = 0; i < 6; ++i) of[i] = FrameProduct(c, kPairs[i][0], kPairs[i][1], rate, lane);
@@ -401,10 +421,14 @@ HWY_ATTR void MakeBundleRows(const BundleArrays& all, const Block8* shapes) {
   for (std::size_t b = 0; b < all.count; ++b) {
     const PairBundle& bundle = all.bundles[b];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
-      Modes modes;
+      ModesAtHand at_hand;
+      const Modes modes(all, bundle, at_hand);
       ReadModes(all, bundle, shapes, lane, modes);
-      const Vector root_a = Get(bundle.root[0], lane), root_b = Get(bundle.root[1], lane);
-      const Vector rate = hn::MulAdd(root_a, root_a, hn::Mul(root_b, root_b));
+      Vector rate[3];
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Vector a = Get(bundle.root[0][i], lane), b = Get(bundle.root[1][i], lane);
+        rate[i] = hn::MulAdd(a, a, hn::Mul(b, b));
+      }
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         BundleContact& c = all.contacts[bundle.first + k];
         for (std::size_t s = 0; s < 2; ++s) MakeTurns(bundle, c, s, lane);
@@ -441,7 +465,7 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
     PairBundle& bundle = all.bundles[backward ? all.count - 1 - i : i];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
       Works works{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-      Coordinates y;
+      Coordinates y(all, bundle);
       ReadCoordinates(all, bundle, motion, lane, y);
       for (std::int32_t j = 0; j < bundle.count; ++j) {
         const std::int32_t k = backward ? bundle.count - 1 - j : j;
@@ -466,7 +490,7 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
   }
 }
 
-/// How points of two bodies have come apart since the step's start, by components.
+/// How points of two bodies come apart, by components.
 HWY_INLINE HWY_ATTR void Travel(const BundleContact& c, const Vector (*frames)[12], std::size_t lane, Vector* apart) {
   for (std::size_t i = 0; i < 3; ++i) {
     Vector of[2];
@@ -475,6 +499,29 @@ HWY_INLINE HWY_ATTR void Travel(const BundleContact& c, const Vector (*frames)[1
       for (std::size_t j = 0; j < 3; ++j) of[s] = hn::MulAdd(frames[s][3 + 3 * i + j], Get(c.arm[s][j], lane), of[s]);
     }
     apart[i] = hn::Sub(of[0], of[1]);
+  }
+}
+
+/// Twelve numbers of each side's frame.
+HWY_INLINE HWY_ATTR void ReadShifts(const PairBundle& bundle, const FrameShift* frames,
+                                    const float (FrameShift::*first)[3], std::size_t lane, Vector (*to)[12]) {
+  for (std::size_t s = 0; s < 2; ++s) {
+    const float* from[kLanesAtOnce];
+    for (std::size_t l = 0; l < kLanesAtOnce; ++l) from[l] = frames[bundle.frame[s][lane + l]].*first;
+    for (std::size_t i = 0; i < 12; i += 4) Gather4(from, i, to[s] + i);
+  }
+}
+
+/// What led bodies are carried by in the substep.
+HWY_INLINE HWY_ATTR void AddCarried(const BundleArrays& all, const PairBundle& bundle, const FrameShift* frames,
+                                    std::size_t lane) {
+  Vector carried[2][12], apart[3];
+  ReadShifts(bundle, frames, &FrameShift::carried, lane, carried);
+  for (std::int32_t k = 0; k < bundle.count; ++k) {
+    BundleContact& c = all.contacts[bundle.first + k];
+    Travel(c, carried, lane, apart);
+    Put(AddDot(c.axes[0], apart, Get(c.gap, lane), lane), c.gap, lane);
+    for (std::size_t t = 0; t < 2; ++t) Put(AddDot(c.axes[1 + t], apart, Get(c.slip[t], lane), lane), c.slip[t], lane);
   }
 }
 
@@ -506,19 +553,17 @@ HWY_ATTR void MeasureBundles(const BundleArrays& all, const FrameShift* frames, 
     PairBundle& bundle = all.bundles[b];
     bundle.overlaps = false;
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
-      Vector of[2][12];
-      for (std::size_t s = 0; s < 2; ++s) {
-        const float* from[kLanesAtOnce];
-        for (std::size_t l = 0; l < kLanesAtOnce; ++l) from[l] = frames[bundle.frame[s][lane + l]].shift;
-        for (std::size_t i = 0; i < 12; i += 4) Gather4(from, i, of[s] + i);
-      }
-      Modes modes;
+      Vector come[2][12];
+      ReadShifts(bundle, frames, &FrameShift::shift, lane, come);
+      ModesAtHand at_hand;
+      const Modes modes(all, bundle, at_hand);
       ReadModes(all, bundle, shapes, lane, modes);
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         Vector bent[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
         AddModes(bundle, RowsOf(all, bundle, k), modes, lane, bent);
-        if (MeasureOne(all.contacts[bundle.first + k], of, bent, share, most, lane)) bundle.overlaps = true;
+        if (MeasureOne(all.contacts[bundle.first + k], come, bent, share, most, lane)) bundle.overlaps = true;
       }
+      if (bundle.carried) AddCarried(all, bundle, frames, lane);
     }
   }
 }
@@ -552,7 +597,7 @@ HWY_ATTR void FindResiduals(const BundleArrays& all, const Block8* motion) {
     PairBundle& bundle = all.bundles[b];
     Vector largest = hn::Zero(d);
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
-      Coordinates y;
+      Coordinates y(all, bundle);
       ReadCoordinates(all, bundle, motion, lane, y);
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         const BundleContact& c = all.contacts[bundle.first + k];
@@ -573,7 +618,7 @@ HWY_ATTR void ApplyBundleForces(const BundleArrays& all, Block8* motion) {
   for (std::size_t b = 0; b < all.count; ++b) {
     const PairBundle& bundle = all.bundles[b];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
-      Coordinates y;
+      Coordinates y(all, bundle);
       ReadCoordinates(all, bundle, motion, lane, y);
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         const BundleContact& c = all.contacts[bundle.first + k];
@@ -599,12 +644,13 @@ HWY_ATTR void ScaleBundleForces(const BundleArrays& all, const Block8* shares) {
     }
 }
 
-/// As NoteRebound(). @param start, end u of the free motion and of that found
+/// @param start, end the normal's numbers by the free motion and by that found, less what carries bodies
 HWY_INLINE HWY_ATTR void NoteOne(BundleContact& c, Vector start, Vector end, std::size_t lane) {
   const Lanes d;
+  const Vector carried = hn::Sub(Get(c.gap, lane), Get(c.now, lane));  // of rigid bodies, which do not bend
   const Vector zero = hn::Zero(d), stage = Get(c.stage, lane), together = hn::Set(d, kTogether),
                parted = hn::Set(d, kParted);
-  const Vector mean = hn::NegMulAdd(hn::Set(d, 2.0f), Get(c.fall, lane), hn::Add(start, end));
+  const Vector mean = hn::MulAdd(hn::Set(d, 2.0f), hn::Sub(carried, Get(c.fall, lane)), hn::Add(start, end));
   const Vector given = hn::Mul(hn::Set(d, 0.5f), hn::Mul(Get(c.force[0], lane), mean));
   // Contacts without a rebound, beside one that has it, stay open.
   const auto presses = hn::And(hn::Gt(Get(c.rebound, lane), zero), hn::Gt(Get(c.force[0], lane), zero));

@@ -1,10 +1,10 @@
 // The vector loops of the frames of bodies by small steps: eight at a time, one in each lane, in double. Plain data
-// only, as in sweep_kernels.h, whose coordinates these are.
+// only, as in coordinate_blocks.h, whose coordinates these are.
 //
 // Every result is the same bits on every instruction set that has fused multiply-add, whatever its vectors' length.
 #pragma once
 
-#include "sweep_kernels.h"
+#include "coordinate_blocks.h"
 
 namespace limber::internal {
 

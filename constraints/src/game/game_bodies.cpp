@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "limber/constraints/constraint.h"
+#include "limber/core/cross_matrix.h"
 
 namespace limber::internal {
 namespace {
@@ -296,11 +297,12 @@ FrameExcitation GameBodies::lead(std::size_t at, int number) {
     led.free.set_parent(between(led.start, led.target, static_cast<double>(number + 1) / plan_.count, plan_.step));
   const FrameExcitation excitation =
       led.free.begin_step(c, load_of(body), body.group->first_moment(body.slot), plan_.length());
-  shift.is_carried = true;
-  write_matrix(to_matrix(now.pose().q), shift.attitude);
   write_vector(led.free.pose().p - now.pose().p, shift.carried);
-  const Vec3 turn = rotation_vector(led.free.parent().pose.q * now.parent().pose.q.conjugate());
-  write_vector(c.motion == FrameMotion::kPoint ? Vec3(Vec3::Zero()) : turn, shift.carried_turn);
+  Vec3 turn = Vec3::Zero();
+  if (c.motion != FrameMotion::kPoint)
+    turn = rotation_vector(led.free.parent().pose.q * now.parent().pose.q.conjugate());
+  write_vector(turn, shift.carried_turn);
+  write_matrix(cross_matrix(turn) * to_matrix(now.pose().q), shift.swung);
   return excitation;
 }
 

@@ -12,12 +12,6 @@ namespace {
 
 constexpr float kPushShare = kConstraintsTuning.small_steps.push_share;
 
-float dot(const Block8& a, const Block8& b) {
-  float sum = 0.0f;
-  for (int i = 0; i < 8; ++i) sum += a.v[i] * b.v[i];
-  return sum;
-}
-
 void write_axis(const Vec3& v, float* to) {
   for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(v[i]);
 }
@@ -31,34 +25,6 @@ double yield_of(const PreparedSide& side, const Vec3& n) {
     for (const VertexShare& w : side.corners)
       if (!local || v.vertex == w.vertex) sum += v.share * w.share * compliance.block(v.vertex, w.vertex);
   return n.dot(sum * n);
-}
-
-/// √ρ n·R U of each mode, three blocks of each eight.
-/// @param axes along which the side is pushed, world. @param modal scratch, a number a mode
-void write_mode_rows(const BodyStates& states, const GameBody& body, const PreparedSide& side, const Mat3& axes,
-                     std::span<double> modal, Block8* rows) {
-  if (body.modes == nullptr || side.model == nullptr) return;
-  const std::vector<float>& roots = body.modes->roots();
-  const Mat3 axes_B = body.start.R.transpose() * axes;
-  if (side.skin == nullptr) {
-    const VertexRows& vertices = side.model->collision_rows();
-    const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
-    ModePoint point{.roots = roots.data(), .blocks = roots.size() / 8};
-    for (std::size_t c = 0; c < 3; ++c) {
-      point.weight[c] = static_cast<float>(side.at.weight[c]);
-      for (int x = 0; x < 3; ++x) point.rows[c][x] = vertices.row(corners[c], x);
-    }
-    for (int axis = 0; axis < 3; ++axis) write_axis(axes_B.col(axis), point.axes[axis]);
-    make_mode_rows(point, rows);
-    return;
-  }
-  modal = modal.first(static_cast<std::size_t>(side.model->modes()));
-  for (Index axis = 0; axis < 3; ++axis) {
-    std::ranges::fill(modal, 0.0);
-    side.shape(states.amplitudes(side.body, StepTime::kStart)).add_force(side.at, axes_B.col(axis), modal);
-    for (std::size_t m = 0; m < modal.size(); ++m)
-      rows[3 * (m / 8) + static_cast<std::size_t>(axis)].v[m % 8] = static_cast<float>(modal[m]) * roots[m];
-  }
 }
 
 /// What a contact of a body with a skin is made by works on that skin's memory.
@@ -97,24 +63,16 @@ bool meets_law(const Vec3& f, double friction) {
 void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std::span<PreparedContact> contacts,
                               const Options& options, Jobs& jobs) {
   contacts_ = contacts;
-  rows_.clear();
-  numbers_.clear();
-  blocks_.clear();
-  rolling_.clear();
   for (const PreparedContact& contact : contacts)
     for (const Index body : {contact.a.body, contact.b.body})
       if (bodies.of(body) >= 0 && contact.a.body != contact.b.body) bodies.keep_axes(bodies.of(body));
   bundles_.arrange(bodies, contacts);
   bundles_.fill(jobs, [&](std::size_t i) {
-    if (!shares_memory(contacts[i])) put_in_bundle(states, bodies, i, options);
+    if (!shares_memory(contacts[i])) put(states, bodies, i, options);
   });
   for (std::size_t i = 0; i < contacts.size(); ++i)
-    if (!bundles_.holds(i))
-      add_row(states, bodies, i, options);
-    else if (shares_memory(contacts[i]))
-      put_in_bundle(states, bodies, i, options);
+    if (shares_memory(contacts[i])) put(states, bodies, i, options);
   bundles_.for_all(jobs, [&](const BundleArrays& part) { make_bundle_rows(part, bodies.shapes().data()); });
-  sums_.assign(rows_.size(), Vec3::Zero());
   ties_.reset(bodies.bodies().size());
   touched_.assign(bodies.bodies().size(), false);
   for (const PreparedContact& contact : contacts) {
@@ -127,56 +85,61 @@ void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std:
   for (std::size_t i = 0; i < islands_.size(); ++i) islands_[i] = ties_.root(static_cast<Index>(i));
 }
 
-void GameContacts::put_in_bundle(const BodyStates& states, const GameBodies& bodies, std::size_t i,
-                                 const Options& options) {
+void GameContacts::put(const BodyStates& states, const GameBodies& bodies, std::size_t i, const Options& options) {
   const PreparedContact& contact = contacts_[i];
-  const ContactRow row = make(states, bodies, contact, options);
-  bundles_.put(i, row);
-  for (std::size_t s = 0; s < 2; ++s) {
-    if (row.side[s].blocks <= 1) continue;
-    std::array<Block8, 3 * kMostBundledModes / 8> rows{};
-    std::array<double, kMostBundledModes> modal;
-    write_mode_rows(states, bodies.body(row.side[s].frame), contact.side(s), PreparedContact::sign(s) * contact.axes,
-                    modal, rows.data());
-    bundles_.put_modes(i, s, rows.data());
-  }
-  if (row.rebound > 0.0f) bundles_.rebound(i, row);
+  bundles_.put(i, make(states, bodies, contact, options));
+  for (std::size_t s = 0; s < 2; ++s) put_modes(states, bodies, i, s);
   if (const double radius = rolling_radius(states, contact, options); radius > 0.0)
     bundles_.resist_rolling(i, radius, last_moment(contact));
 }
 
-/// Of a contact that bundles do not hold.
-void GameContacts::add_row(const BodyStates& states, GameBodies& bodies, std::size_t i, const Options& options) {
-  const PreparedContact& contact = contacts_[i];
-  ContactRow row = make(states, bodies, contact, options);
-  for (std::size_t s = 0; s < 2; ++s) {
-    ContactSideRows& at = row.side[s];
-    if (at.frame < 0) continue;
-    const Mat3 axes = PreparedContact::sign(s) * contact.axes;
-    at.rows = static_cast<std::int32_t>(blocks_.size());
-    blocks_.resize(blocks_.size() + static_cast<std::size_t>(3 * at.blocks));
-    write_frame_rows(bodies, at, axes);
-    modal_.resize(static_cast<std::size_t>(8 * at.blocks));
-    write_mode_rows(states, bodies.body(at.frame), contact.side(s), axes, modal_,
-                    &blocks_[static_cast<std::size_t>(at.rows)] + 3);
+/// √ρ n·R U of each mode. Where a body touches itself its modes get what both sides do.
+void GameContacts::put_modes(const BodyStates& states, const GameBodies& bodies, std::size_t i, std::size_t s) {
+  const PreparedSide& side = contacts_[i].side(s);
+  const std::int32_t at = bodies.of(side.body);
+  if (at < 0 || side.model == nullptr || bodies.body(at).modes == nullptr) return;
+  const std::vector<float>& roots = bodies.body(at).modes->roots();
+  const std::size_t blocks = roots.size() / 8, of = contacts_[i].a.body == contacts_[i].b.body ? 0 : s;
+  const Mat3 axes = bodies.body(at).start.R.transpose() * (PreparedContact::sign(s) * contacts_[i].axes);
+  if (side.skin != nullptr) {
+    modal_.resize(static_cast<std::size_t>(side.model->modes()));
+    skin_rows_.assign(3 * blocks, {});
+    for (Index axis = 0; axis < 3; ++axis) {
+      std::ranges::fill(modal_, 0.0);
+      side.shape(states.amplitudes(side.body, StepTime::kStart)).add_force(side.at, axes.col(axis), modal_);
+      for (std::size_t m = 0; m < modal_.size(); ++m)
+        skin_rows_[3 * (m / 8) + static_cast<std::size_t>(axis)].v[m % 8] = static_cast<float>(modal_[m]) * roots[m];
+    }
+    return bundles_.add_modes(i, of, 0, skin_rows_);
   }
-  if (contact.a.body == contact.b.body) join_sides(row);
-  find_masses(bodies, row);
-  rows_.push_back(row);
-  numbers_.push_back(i);
-  if (const double radius = rolling_radius(states, contact, options); radius > 0.0)
-    add_rolling(bodies, contact, radius);
+  constexpr std::size_t kAtOnce = 4;
+  std::array<Block8, 3 * kAtOnce> rows;
+  const VertexRows& vertices = side.model->collision_rows();
+  const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
+  ModePoint point;
+  for (int axis = 0; axis < 3; ++axis) write_axis(axes.col(axis), point.axes[axis]);
+  for (std::size_t first = 0; first < blocks; first += kAtOnce) {
+    point.roots = roots.data() + 8 * first, point.blocks = std::min(kAtOnce, blocks - first);
+    for (std::size_t c = 0; c < 3; ++c) {
+      point.weight[c] = static_cast<float>(side.at.weight[c]);
+      for (int x = 0; x < 3; ++x) point.rows[c][x] = vertices.row(corners[c], x) + 8 * first;
+    }
+    make_mode_rows(point, rows.data());
+    bundles_.add_modes(i, of, first, std::span(rows).first(3 * point.blocks));
+  }
 }
 
-/// All but rows of coordinates and masses; `rest` is the gap.
 ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
                               const Options& options) const {
   ContactRow row;
   double thinnest = std::numeric_limits<double>::infinity(), yields = 0.0;
-  for (int i = 0; i < 3; ++i) write_axis(contact.axes.col(i), row.axes[i]);
+  row.axes = contact.axes;
   for (std::size_t s = 0; s < 2; ++s) {
     const PreparedSide& side = contact.side(s);
-    place_side(states, bodies, side, row.side[s]);
+    if (const std::int32_t at = bodies.of(side.body); at >= 0) {
+      row.side[s].arm = side.place(states.amplitudes(side.body, StepTime::kStart));
+      row.side[s].lever = bodies.body(at).start.R * row.side[s].arm + side.rim;
+    }
     const auto number = static_cast<std::size_t>(side.body);
     if (!states.is_static(side.body) && number < options.thickness.size())
       thinnest = std::min(thinnest, options.thickness[number]);
@@ -184,15 +147,13 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
       yields += yield_of(
           side, side.turned_back(states.pose(side.body, StepTime::kStart).q.conjugate() * contact.axes.col(0)));
   }
-  row.friction = static_cast<float>(contact.friction);
-  row.slop = std::isfinite(thinnest) ? static_cast<float>(options.steps.slop * thinnest) : 0.0f;
-  row.compliance = static_cast<float>(yields);
-  row.rest = static_cast<float>(contact.axes.col(0).dot(contact.offset));
-  for (int t = 0; t < 2; ++t)
-    row.running[t] = static_cast<float>(bodies.plan().length() * contact.axes.col(1 + t).dot(contact.running));
-  const Vec3 last = contact.axes.transpose() * contact.last_force;
-  for (int i = 0; i < 3; ++i) row.force[i] = static_cast<float>(last[i]);
-  row.force[0] = std::max(0.0f, row.force[0]);
+  row.friction = contact.friction;
+  row.slop = std::isfinite(thinnest) ? options.steps.slop * thinnest : 0.0;
+  row.compliance = yields;
+  row.rest = contact.axes.col(0).dot(contact.offset);
+  for (int t = 0; t < 2; ++t) row.running[t] = bodies.plan().length() * contact.axes.col(1 + t).dot(contact.running);
+  row.force = contact.axes.transpose() * contact.last_force;
+  row.force[0] = std::max(0.0, row.force[0]);
   if (contact.restitution > 0.0) begin_rebound(bodies, contact, row);
   return row;
 }
@@ -200,68 +161,12 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
 void GameContacts::begin_rebound(const GameBodies& bodies, const PreparedContact& contact, ContactRow& row) const {
   row.rebound = static_cast<float>(contact.restitution * contact.restitution);
   row.fall = static_cast<float>(
-      contact.axes.col(0).dot(bodies.fall_of(row.side[0].frame) - bodies.fall_of(row.side[1].frame)));
-  row.stage = row.force[0] > 0.0f ? kParted : 0.0f;
+      contact.axes.col(0).dot(bodies.fall_of(bodies.of(contact.a.body)) - bodies.fall_of(bodies.of(contact.b.body))));
+  row.stage = row.force[0] > 0.0 ? kParted : 0.0f;
   const Rebound* known = find(rebound_memory_, contact.id);
   if (known == nullptr) return;
   row.stage = known->stage, row.energy = known->energy;
   if (row.stage >= kTogether) row.release = row.energy;
-}
-
-void GameContacts::place_side(const BodyStates& states, const GameBodies& bodies, const PreparedSide& side,
-                              ContactSideRows& at) {
-  at.frame = bodies.of(side.body);
-  if (at.frame < 0) return;
-  const GameBody& body = bodies.body(at.frame);
-  at.body = body.first;
-  at.blocks = body.blocks;
-  const Vec3 carried_B = side.place(states.amplitudes(side.body, StepTime::kStart));
-  write_axis(carried_B, at.arm);
-  write_axis(body.start.R * carried_B + side.rim, at.lever);
-}
-
-void GameContacts::write_frame_rows(const GameBodies& bodies, const ContactSideRows& at, const Mat3& axes) {
-  const Vec3 lever(at.lever[0], at.lever[1], at.lever[2]);
-  for (Index i = 0; i < 3; ++i)
-    bodies.write_frame_row(bodies.body(at.frame), axes.col(i), lever.cross(axes.col(i)),
-                           blocks_[static_cast<std::size_t>(at.rows + i)]);
-}
-
-/// A body that touches itself: its frame feels nothing of that, and its modes both sides.
-void GameContacts::join_sides(ContactRow& row) {
-  ContactSideRows &a = row.side[0], &b = row.side[1];
-  for (std::int32_t i = 0; i < 3 * a.blocks; ++i)
-    for (int l = 0; l < 8; ++l)
-      blocks_[static_cast<std::size_t>(a.rows + i)].v[l] += blocks_[static_cast<std::size_t>(b.rows + i)].v[l];
-  for (std::int32_t i = 0; i < 3; ++i) blocks_[static_cast<std::size_t>(a.rows + i)] = {};
-  a.frame = b.frame = -1;
-  b.blocks = 0;
-}
-
-/// Effective masses; takes from the gap in `rest` what the modes give it.
-void GameContacts::find_masses(const GameBodies& bodies, ContactRow& row) {
-  float nn = 0.0f, nt[2] = {}, tt[3] = {}, frames = 0.0f, bent = 0.0f;
-  for (const ContactSideRows& side : row.side)
-    for (std::int32_t k = 0; k < side.blocks; ++k) {
-      const Block8* rows = &blocks_[static_cast<std::size_t>(side.rows + 3 * k)];
-      const float own = dot(rows[0], rows[0]);
-      nn += own;
-      nt[0] += dot(rows[0], rows[1]), nt[1] += dot(rows[0], rows[2]);
-      tt[0] += dot(rows[1], rows[1]), tt[1] += dot(rows[1], rows[2]), tt[2] += dot(rows[2], rows[2]);
-      if (k == 0)
-        frames += own;
-      else
-        bent += dot(rows[0], bodies.shapes()[static_cast<std::size_t>(side.body + k)]);
-    }
-  row.rest -= bent;
-  nn += row.compliance;
-  // One step for both tangents, the block's largest eigenvalue: what slides is braked against its slip.
-  const float largest = 0.5f * (tt[0] + tt[2]) + std::sqrt(0.25f * (tt[0] - tt[2]) * (tt[0] - tt[2]) + tt[1] * tt[1]);
-  const auto inverse = [](float x) { return x > 0.0f ? 1.0f / x : 0.0f; };
-  row.inverse_normal = inverse(nn);
-  row.inverse_tangent = inverse(largest);
-  row.inverse_push = inverse(frames);
-  for (int t = 0; t < 2; ++t) row.coupling[t] = nt[t];
 }
 
 /// At the end of the last step, N·m; zero where it was not there.
@@ -270,29 +175,8 @@ Vec3 GameContacts::last_moment(const PreparedContact& contact) const {
   return known != nullptr ? known->moment : Vec3(Vec3::Zero());
 }
 
-void GameContacts::add_rolling(const GameBodies& bodies, const PreparedContact& contact, double radius) {
-  RollingRow rolling{.contact = static_cast<std::int32_t>(rows_.size() - 1), .radius = static_cast<float>(radius)};
-  float trace = 0.0f;
-  for (std::size_t s = 0; s < 2; ++s) {
-    const std::int32_t frame = bodies.of(contact.side(s).body);
-    if (frame < 0) continue;
-    rolling.rows[s] = static_cast<std::int32_t>(blocks_.size());
-    for (int i = 0; i < 3; ++i) {
-      Block8 row;
-      bodies.write_frame_row(bodies.body(frame), Vec3::Zero(), PreparedContact::sign(s) * Vec3::Unit(i), row);
-      trace += dot(row, row);
-      blocks_.push_back(row);
-    }
-  }
-  if (!(trace > 0.0f)) return;
-  rolling.inverse = 1.0f / trace;  // at most that of the largest eigenvalue
-  write_axis(last_moment(contact), rolling.moment);
-  rolling_.push_back(rolling);
-}
-
 void GameContacts::apply_last_forces(GameBodies& bodies, Jobs& jobs) {
   bundles_.in_order(jobs, false, [&](const BundleArrays& part) { apply_bundle_forces(part, bodies.answers().data()); });
-  apply_forces(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), {blocks_.data(), bodies.answers().data()});
 }
 
 bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& steps, Jobs& jobs) {
@@ -300,9 +184,7 @@ bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& ste
   bundles_.for_all(jobs, [&](const BundleArrays& part) {
     measure_bundles(part, bodies.shifts().data(), bodies.shapes().data(), kPushShare, most);
   });
-  const bool rows_overlap = measure_contacts(rows_.data(), rows_.size(), blocks_.data(), bodies.shapes().data(),
-                                             bodies.shifts().data(), kPushShare, most);
-  return bundles_.overlap() || rows_overlap;
+  return bundles_.overlap();
 }
 
 // A share s of the forces f changes the energy of bodies and springs by s a + ½ s² b less what springs held,
@@ -333,80 +215,40 @@ void GameContacts::add_works(const GameBodies& bodies) {
     works.square += yielded;
     works.given += given;
   });
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    const ContactRow& c = rows_[i];
-    Works& works = works_of(frame_of(bodies, i));
-    works.linear += static_cast<double>(c.force[0] * (c.gap - std::min(c.now, 0.0f)) + c.force[1] * c.slip[0] +
-                                        c.force[2] * c.slip[1]);
-    works.square += static_cast<double>(c.compliance * c.force[0] * c.force[0]);
-    works.given += static_cast<double>(c.release + 0.5f * c.compliance * c.before * c.before);
-  }
 }
 
 void GameContacts::scale_forces(GameBodies& bodies, std::span<const double> moved) {
   const auto share = [&](std::int32_t frame) { return works_of(frame).share; };
   bundles_.scale(share);
-  for (std::size_t i = 0; i < rows_.size(); ++i)
-    for (float& force : rows_[i].force) force *= share(frame_of(bodies, i));
-  for (RollingRow& rolling : rolling_)
-    for (float& moment : rolling.moment) moment *= share(frame_of(bodies, static_cast<std::size_t>(rolling.contact)));
   for (std::size_t i = 0; i < bodies.bodies().size(); ++i)
     if (const float s = share(static_cast<std::int32_t>(i)); s < 1.0f) bodies.scale_answer(i, s, moved);
 }
 
 void GameContacts::sweep(GameBodies& bodies, bool backward, Jobs& jobs) {
   Block8* motion = bodies.motion().data();
-  const auto bundles = [&] {
-    bundles_.in_order(jobs, backward, [&](const BundleArrays& part) { sweep_bundles(part, backward, motion); });
-  };
-  if (!backward) bundles();
-  sweep_contacts(rows_.data(), rows_.size(), rolling_.data(), rolling_.size(), backward, {blocks_.data(), motion});
-  if (backward) bundles();
+  bundles_.in_order(jobs, backward, [&](const BundleArrays& part) { sweep_bundles(part, backward, motion); });
 }
 
 void GameContacts::push_apart(GameBodies& bodies, bool backward, Jobs& jobs) {
   Block8* pushes = bodies.pushes().data();
-  const auto bundles = [&] {
-    bundles_.in_order(jobs, backward, [&](const BundleArrays& part) { push_bundles(part, backward, pushes); });
-  };
-  if (!backward) bundles();
-  push_contacts(rows_.data(), rows_.size(), backward, blocks_.data(), pushes);
-  if (backward) bundles();
+  bundles_.in_order(jobs, backward, [&](const BundleArrays& part) { push_bundles(part, backward, pushes); });
 }
 
 void GameContacts::end_substep(const GameBodies& bodies, Jobs& jobs) {
   const Block8* free = bodies.free_motion().data();
   const Block8* motion = bodies.motion().data();
   bundles_.for_all(jobs, [&](const BundleArrays& part) { note_bundle_rebounds(part, free, motion); });
-  note_rebounds(rows_.data(), rows_.size(), blocks_.data(), free, motion);
-  for (std::size_t i = 0; i < rows_.size(); ++i)
-    for (int axis = 0; axis < 3; ++axis) sums_[i][axis] += static_cast<double>(rows_[i].force[axis]);
 }
 
 void GameContacts::end_step(const SubstepPlan& plan) {
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    const float* last = rows_[i].force;
-    tell(contacts_[numbers_[i]], {Vec3(last[0], last[1], last[2]), sums_[i], static_cast<double>(rows_[i].compliance)},
-         plan);
-  }
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    if (bundles_.holds(i)) tell(contacts_[i], {bundles_.force(i), bundles_.sum(i), bundles_.compliance(i)}, plan);
   rolling_memory_.clear();
-  for (const RollingRow& rolling : rolling_) {
-    const float* moment = rolling.moment;
-    rolling_memory_.push_back(
-        {contacts_[numbers_[static_cast<std::size_t>(rolling.contact)]].id, Vec3(moment[0], moment[1], moment[2])});
-  }
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    if (bundles_.holds(i) && bundles_.resists_rolling(i))
-      rolling_memory_.push_back({contacts_[i].id, bundles_.moment(i)});
-  std::ranges::sort(rolling_memory_, {}, &Rolling::id);
   rebound_memory_.clear();
-  for (std::size_t i = 0; i < rows_.size(); ++i)
-    remember_rebound({contacts_[numbers_[i]].id, rows_[i].stage, rows_[i].energy});
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    if (contacts_[i].restitution > 0.0 && bundles_.holds(i))
-      remember_rebound({contacts_[i].id, bundles_.stage(i), bundles_.energy(i)});
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    tell(contacts_[i], {bundles_.force(i), bundles_.sum(i), bundles_.compliance(i)}, plan);
+    if (bundles_.resists_rolling(i)) rolling_memory_.push_back({contacts_[i].id, bundles_.moment(i)});
+    if (contacts_[i].restitution > 0.0) remember_rebound({contacts_[i].id, bundles_.stage(i), bundles_.energy(i)});
+  }
+  std::ranges::sort(rolling_memory_, {}, &Rolling::id);
   std::ranges::sort(rebound_memory_, {}, &Rebound::id);
 }
 
@@ -427,16 +269,13 @@ void GameContacts::tell(PreparedContact& contact, const Told& told, const Subste
 double GameContacts::residual(GameBodies& bodies, Jobs& jobs) {
   Block8* motion = bodies.motion().data();
   bundles_.for_all(jobs, [&](const BundleArrays& part) { find_residuals(part, motion); });
-  return static_cast<double>(
-      std::max(residual_of_contacts(rows_.data(), rows_.size(), {blocks_.data(), motion}), bundles_.residual()));
+  return static_cast<double>(bundles_.residual());
 }
 
 bool GameContacts::meet_law() const {
   for (std::size_t i = 0; i < contacts_.size(); ++i)
-    if (bundles_.holds(i) && !meets_law(bundles_.force(i), bundles_.friction(i))) return false;
-  return std::ranges::all_of(rows_, [](const ContactRow& row) {
-    return meets_law(Vec3(row.force[0], row.force[1], row.force[2]), static_cast<double>(row.friction));
-  });
+    if (!meets_law(bundles_.force(i), bundles_.friction(i))) return false;
+  return true;
 }
 
 }  // namespace limber::internal

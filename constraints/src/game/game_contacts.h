@@ -24,7 +24,7 @@ class GameContacts {
       return std::tie(s.id, s.moment);
     }
   };
-  /// Contacts that have begun to rebound, from step to step: as ContactRow has them.
+  /// Contacts that have begun to rebound, from step to step: as BundleContact has them.
   struct Rebound {
     std::uint64_t id = 0;  // of the contact
     float stage = 0.0f, energy = 0.0f;
@@ -54,7 +54,7 @@ class GameContacts {
   void limit_forces(GameBodies& bodies, std::span<const double> moved, Jobs& jobs);
   void sweep(GameBodies& bodies, bool backward, Jobs& jobs);
   void push_apart(GameBodies& bodies, bool backward, Jobs& jobs);
-  /// Notes what rebounds, and adds up the forces of rows outside of bundles.
+  /// Notes what rebounds.
   void end_substep(const GameBodies& bodies, Jobs& jobs);
   /// Tells the contacts what acted on them.
   void end_step(const SubstepPlan& plan);
@@ -73,8 +73,8 @@ class GameContacts {
  private:
   ContactRow make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
                   const Options& options) const;
-  void add_row(const BodyStates& states, GameBodies& bodies, std::size_t contact, const Options& options);
-  void put_in_bundle(const BodyStates& states, const GameBodies& bodies, std::size_t contact, const Options& options);
+  void put(const BodyStates& states, const GameBodies& bodies, std::size_t contact, const Options& options);
+  void put_modes(const BodyStates& states, const GameBodies& bodies, std::size_t contact, std::size_t side);
   /// Of a contact after the step: the last substep's force along its axes, the sum of all, and its compliance.
   struct Told {
     Vec3 last, sum;
@@ -83,11 +83,6 @@ class GameContacts {
   void remember_rebound(const Rebound& rebound);
   void begin_rebound(const GameBodies& bodies, const PreparedContact& contact, ContactRow& row) const;
   void tell(PreparedContact& contact, const Told& told, const SubstepPlan& plan) const;
-  static void place_side(const BodyStates& states, const GameBodies& bodies, const PreparedSide& side,
-                         ContactSideRows& at);
-  void write_frame_rows(const GameBodies& bodies, const ContactSideRows& at, const Mat3& axes);
-  void join_sides(ContactRow& row);
-  void find_masses(const GameBodies& bodies, ContactRow& row);
   /// Of bodies that contacts tie together: what their forces change the energy by, what they may, and what of them is
   /// left.
   struct Works {
@@ -97,31 +92,20 @@ class GameContacts {
   Works& works_of(std::int32_t frame) {
     return frame < 0 ? works_.back() : works_[static_cast<std::size_t>(islands_[static_cast<std::size_t>(frame)])];
   }
-  /// One that moves, of a row of `rows_`; −1: none.
-  std::int32_t frame_of(const GameBodies& bodies, std::size_t row) const {
-    const PreparedContact& contact = contacts_[numbers_[row]];
-    return std::max(bodies.of(contact.a.body), bodies.of(contact.b.body));
-  }
   void add_works(const GameBodies& bodies);
   void scale_forces(GameBodies& bodies, std::span<const double> moved);
   Vec3 last_moment(const PreparedContact& contact) const;
-  void add_rolling(const GameBodies& bodies, const PreparedContact& contact, double radius);
 
   std::span<PreparedContact> contacts_;
   PairBundles bundles_;
-  // Contacts of bodies that are led, touch themselves or have many modes: those that bundles do not hold.
-  std::vector<ContactRow> rows_;
-  std::vector<std::size_t> numbers_;  // in `contacts_`
-  std::vector<Block8> blocks_;        // of the rows
-  std::vector<RollingRow> rolling_;
-  std::vector<Vec3> sums_;  // of the substeps' forces along each contact's axes, N
   std::vector<Rolling> rolling_memory_;
   std::vector<Rebound> rebound_memory_;
   std::vector<bool> touched_;  // by frame
   DisjointSets ties_;
   std::vector<Index> islands_;  // by frame: the first body of those that contacts tie to it
   std::vector<Works> works_;    // by the first body of an island, and of what does not move
-  std::vector<double> modal_;   // scratch
+  std::vector<double> modal_;   // scratch of bodies with skins, as what follows
+  std::vector<Block8> skin_rows_;
 };
 
 }  // namespace limber::internal

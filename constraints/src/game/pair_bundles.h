@@ -1,5 +1,5 @@
-// Contacts between bodies that are free or stand, packed for the vector loops: pairs in bundles of eight, in an order
-// that gives what Gauss–Seidel from one contact to the next gives.
+// Contacts packed for the vector loops: pairs in bundles of eight, in an order that gives what Gauss–Seidel from one
+// contact to the next gives.
 //
 //   level(pair) = 1 + the largest level of the pairs before it that share a body that moves
 //
@@ -20,25 +20,37 @@
 
 namespace limber::internal {
 
+/// One side of a contact.
+struct ContactArm {
+  Vec3 arm = Vec3::Zero();    // of the point that the body carries along, body axes
+  Vec3 lever = Vec3::Zero();  // from the origin to where the body touches, world
+};
+
+/// One contact, as it is put into its place: fields as those of BundleContact.
+struct ContactRow {
+  ContactArm side[2];
+  Mat3 axes = Mat3::Identity();
+  double rest = 0.0, friction = 0.0, slop = 0.0, compliance = 0.0;
+  double running[2] = {};
+  Vec3 force = Vec3::Zero();
+  float rebound = 0.0f, fall = 0.0f, stage = 0.0f, energy = 0.0f, release = 0.0f;
+};
+
 class PairBundles {
  public:
-  /// Finds places for the contacts of all pairs that the loops take: those of a pair stand one after the other.
+  /// Finds places for the contacts of all pairs: those of a pair stand one after the other. A body that touches itself
+  /// is the first of its pair, and its frame stands.
   void arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts);
-  /// Whether a contact has a place, by its number.
-  bool holds(std::size_t contact) const { return places_[contact].lane >= 0; }
-  /// Empties all places and visits them: visit(contact) for each that has one, those of a bundle one after the other.
+  /// Empties all places and visits them: visit(contact), those of a bundle one after the other.
   template <class Visit>
   void fill(Jobs& jobs, const Visit& visit);
   /// Fills the place of a contact, but for its masses and the rows of modes; `rest` is the gap.
   void put(std::size_t contact, const ContactRow& row);
-  /// @param rows of a side's modes: three blocks of each eight
-  void put_modes(std::size_t contact, std::size_t side, const Block8* rows);
+  /// Adds to the rows of a side's modes. @param first block. @param rows three blocks of each eight
+  void add_modes(std::size_t contact, std::size_t side, std::size_t first, std::span<const Block8> rows);
   /// Gives a contact in its place resistance to rolling. @param radius m, > 0. @param moment N·m, to begin with
   void resist_rolling(std::size_t contact, double radius, const Vec3& moment);
 
-  /// Gives a contact in its place a rebound: those fields of `row`.
-  void rebound(std::size_t contact, const ContactRow& row);
-  /// As ContactRow has them.
   float stage(std::size_t contact) const { return static_cast<float>(read(contact, &BundleContact::stage)); }
   float energy(std::size_t contact) const { return static_cast<float>(read(contact, &BundleContact::energy)); }
 
@@ -74,13 +86,15 @@ class PairBundles {
   /// Up to four contacts of a pair.
   struct Chunk {
     std::int32_t first = 0, count = 0, level = 0;
-    std::int32_t frame[2] = {};   // −1: stands
-    std::int32_t blocks[2] = {};  // of modes
+    std::int32_t body[2] = {-1, -1};  // −1: stands
+    std::int32_t blocks[2] = {};      // of modes
+    bool self = false;                // of a body that touches itself
     std::int32_t width() const { return blocks[0] + blocks[1]; }
   };
   /// The contacts of a lane, in their order.
   struct Lane {
     std::int32_t first = 0, count = 0;
+    std::int32_t frame = -1;  // one of those that move; −1: none
   };
   /// Bundles that share no body that moves, or few, which are not worth a second thread.
   struct Run {
@@ -88,11 +102,12 @@ class PairBundles {
     bool apart = false;
   };
   static constexpr std::size_t kBundlesAtOnce = 4;  // of one thread
-  BundleArrays arrays() { return {bundles_.data(), packed_.data(), rows_.data(), bundles_.size(), zeros_, standing_}; }
+  BundleArrays arrays() {
+    return {bundles_.data(), packed_.data(), rows_.data(), room_.data(), bundles_.size(), zeros_, standing_};
+  }
   void add_to_runs(std::size_t begin);
   struct Place {
-    std::int32_t at = -1, lane = -1;  // in `packed_`; −1: none
-    std::int32_t bundle = -1;
+    std::int32_t at = -1, lane = -1, bundle = -1;  // the first in `packed_`
   };
   void add_chunks(const GameBodies& bodies, std::span<const PreparedContact> pair, std::size_t first);
   void order_by_level();
@@ -101,16 +116,15 @@ class PairBundles {
   void empty(std::size_t bundle);
   Vec3 read(std::size_t contact, Block8 (BundleContact::*field)[3]) const;
   double read(std::size_t contact, Block8 BundleContact::*field) const;
-  /// −1: a lane without a pair.
-  std::int32_t frame_of(const PairBundle& bundle, std::size_t lane) const {
-    const std::int32_t a = bundle.frame[0][lane], b = bundle.frame[1][lane];
-    return a != standing_ ? a : b != standing_ ? b : -1;
+  std::int32_t frame_of(std::size_t bundle, std::size_t lane) const {
+    return lanes_[bundle * kBundleLanes + lane].frame;
   }
 
   std::int32_t standing_ = 0, zeros_ = 0;
   std::vector<PairBundle> bundles_;
   std::vector<BundleContact> packed_;
   std::vector<Block8> rows_;    // of modes
+  std::vector<Block8> room_;    // for the modes at hand
   std::vector<Block8> shares_;  // by bundle
   std::vector<Place> places_;   // by contact
   std::vector<Lane> lanes_;     // by bundle
@@ -135,17 +149,17 @@ void PairBundles::fill(Jobs& jobs, const Visit& visit) {
 
 template <class Visit>
 void PairBundles::for_all_works(const Visit& visit) const {
-  for (const PairBundle& bundle : bundles_)
+  for (std::size_t b = 0; b < bundles_.size(); ++b)
     for (std::size_t lane = 0; lane < kBundleLanes; ++lane)
-      visit(frame_of(bundle, lane), static_cast<double>(bundle.open.v[lane]),
-            static_cast<double>(bundle.yielded.v[lane]), static_cast<double>(bundle.given.v[lane]));
+      visit(frame_of(b, lane), static_cast<double>(bundles_[b].open.v[lane]),
+            static_cast<double>(bundles_[b].yielded.v[lane]), static_cast<double>(bundles_[b].given.v[lane]));
 }
 
 template <class Share>
 void PairBundles::scale(const Share& share) {
   shares_.resize(bundles_.size());
   for (std::size_t b = 0; b < bundles_.size(); ++b)
-    for (std::size_t lane = 0; lane < kBundleLanes; ++lane) shares_[b].v[lane] = share(frame_of(bundles_[b], lane));
+    for (std::size_t lane = 0; lane < kBundleLanes; ++lane) shares_[b].v[lane] = share(frame_of(b, lane));
   scale_bundle_forces(arrays(), shares_.data());
 }
 
