@@ -44,29 +44,48 @@ Vec3 times(const std::vector<Vec3>& shapes, std::span<const double> z) {
   return u;
 }
 
-/// A rotation by its vector r, θ = |r|:
-///   exp(r) = 1 + s₁ [r] + s₂ [r]²,   exp(r + dr) = exp(J_l dr) exp(r),   J_l = 1 + s₂ [r] + s₃ [r]²
-struct VectorRotation {
-  explicit VectorRotation(const Vec3& r);
-  Mat3 exp() const { return Mat3::Identity() + s1 * K + s2 * square; }
-  Mat3 turning() const { return Mat3::Identity() + s2 * K + s3 * square; }
-
-  Mat3 K, square;
-  double s1 = 1.0, s2 = 0.5, s3 = 1.0 / 6.0;  // sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³
+/// By its vector r: cos ½|r| and the factor of r in the vector part of its quaternion, sin(½|r|)/|r|.
+struct HalfTurn {
+  explicit HalfTurn(const Vec3& r)
+      : angle(r.norm()), cosine(std::cos(0.5 * angle)), factor(angle > 0.0 ? std::sin(0.5 * angle) / angle : 0.5) {}
+  double angle, cosine, factor;
 };
 
-VectorRotation::VectorRotation(const Vec3& r) : K(cross_matrix(r)), square(K * K) {
-  constexpr double kSmall = 1e-2;  // where what is left out of the series is 1e-18
-  const double y = r.squaredNorm(), angle = std::sqrt(y);
-  if (angle < kSmall) {
-    s1 -= y / 6.0 - y * y / 120.0 + y * y * y / 5040.0;
-    s2 -= y / 24.0 - y * y / 720.0;
-    s3 -= y / 120.0 - y * y / 5040.0;
-  } else {
-    s1 = std::sin(angle) / angle;
-    s2 = (1.0 - std::cos(angle)) / y;
-    s3 = (1.0 - s1) / y;
+/// exp([r]ₓ) by Rodrigues.
+Mat3 rotation_by(const Vec3& r) {
+  const HalfTurn half(r);
+  const Mat3 K = cross_matrix(r);
+  return Mat3::Identity() + 2.0 * half.factor * (half.cosine * K + half.factor * K * K);
+}
+
+/// (sinc √v − sinc √u)/(u − v), u = ¼(|a| + |b|)², v = ¼(|a| − |b|)²: by its series where turns are small, else by that
+/// of two ways to write it whose denominator is large.
+double sinc_slope(const HalfTurn& a, const HalfTurn& b) {
+  constexpr double kSmall = 16.0;  // what is left out of the series is 1e-18
+  const double half = 0.5 * (a.angle + b.angle), across = 0.5 * (a.angle - b.angle), u = half * half,
+               v = across * across;
+  const auto sinc = [](double x) { return x != 0.0 ? std::sin(x) / x : 1.0; };
+  if (u - v > 0.25 * kSmall) return (sinc(across) - sinc(half)) / (u - v);
+  if (u > kSmall) return (b.cosine * a.factor - a.cosine * b.factor) / (half * across);
+  double e = 0.0, term = 1.0 / 6.0, sum = 1.0, power = 1.0;  // ±1/(2k + 1)!, Σ uʲ vᵏ⁻¹⁻ʲ, vᵏ⁻¹
+  for (double k = 1.0; k < 17.0; ++k) {
+    e += term * sum;
+    term /= -(2.0 * k + 2.0) * (2.0 * k + 3.0);
+    power *= v, sum = u * sum + power;
   }
+  return e;
+}
+
+/// G of the Cayley vector G (b − a) of exp([b]ₓ) exp(−[a]ₓ), which is what exp turns by per unit of its vector where
+/// both meet. With m = ½(a + b), halves' c = cos and s = the factor, and e = sinc_slope() the vector part of the
+/// quaternion is ½(c_a s_b + c_b s_a)(b − a) + s_a s_b m × (b − a) + ½ e m m·(b − a).
+Mat3 turning_between(const Vec3& a, const Vec3& b) {
+  const HalfTurn from(a), to(b);
+  const Vec3 m = 0.5 * (a + b);
+  const double both = from.factor * to.factor, w = from.cosine * to.cosine + both * a.dot(b);
+  return ((from.cosine * to.factor + to.cosine * from.factor) * Mat3::Identity() + 2.0 * both * cross_matrix(m) +
+          sinc_slope(from, to) * m * m.transpose()) /
+         w;
 }
 
 }  // namespace
@@ -184,7 +203,7 @@ JointFrame MaterialFrame::place(const BodyStates& states, StepTime when) const {
   }
   const std::span<const double> z = states.amplitudes(body_, when);
   at.origin = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
-  if (!rotation_.empty()) at.axes = R * (VectorRotation(turn(z)).exp() * rest_.axes);
+  if (!rotation_.empty()) at.axes = R * (rotation_by(turn(z)) * rest_.axes);
   return at;
 }
 
@@ -228,9 +247,8 @@ FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
   at.axes_B = rest_.axes;
   if (!rotation_.empty()) {
     at.turned = turn(z);
-    const VectorRotation rotation(at.turned);
-    at.turning = rotation.turning();
-    at.axes_B = rotation.exp() * rest_.axes;
+    at.turning = turning_between(at.turned, at.turned);
+    at.axes_B = rotation_by(at.turned) * rest_.axes;
   }
   at.axes = R * at.axes_B;
   return at;
@@ -247,17 +265,7 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
   if (!at.bends) return at;
   at.R_BW = start.R_BW - 0.5 * start.R_BW * cross_matrix(at.states.turn(body_));
   at.axes_B = 0.5 * (start.axes_B + end.axes_B);
-  if (rotation_.empty()) return at;
-  at.turning = VectorRotation(0.5 * (start.turned + end.turned)).turning();
-  at.turned = end.turned - start.turned;
-  const Quaternion turn =
-      quaternion_from_rotation_vector(end.turned) * quaternion_from_rotation_vector(start.turned).conjugate();
-  at.cayley = 2.0 / turn.w * turn.vector();
-  const std::span<const double> z0 = at.states.amplitudes(body_, StepTime::kStart),
-                                z1 = at.states.amplitudes(body_, StepTime::kEnd);
-  double square = 0.0;
-  for (std::size_t i = 0; i < z0.size(); ++i) square += (z1[i] - z0[i]) * (z1[i] - z0[i]);
-  at.inverse_square = square > 0.0 ? 1.0 / square : 0.0;
+  if (!rotation_.empty()) at.turning = turning_between(start.turned, end.turned);
   return at;
 }
 
@@ -266,11 +274,8 @@ void FrameInstant::bend_point(const Vec3& p, const Vec3& n, FrameMeasure& to) co
   to.turn_B += R_BW * (p - position).cross(n);
 }
 
-/// J_l Θ Δz is ε to third order; what is missing is made up for along Δz.
 void FrameInstant::bend_axis(int axis, const Vec3& u, FrameMeasure& to) const {
-  const Vec3 a_B = axes_B.col(axis).cross(R_BW * u), about = turning.transpose() * a_B;
-  to.turn_B += about;
-  to.along_bend += inverse_square * (cayley.dot(a_B) - turned.dot(about));
+  to.turn_B += turning.transpose() * axes_B.col(axis).cross(R_BW * u);
 }
 
 void FrameInstant::add_turn(const Vec3& a, FrameMeasure& to) const {
@@ -286,11 +291,6 @@ void MaterialFrame::write_modal(const FrameInstant& at, const FrameMeasure& meas
   else if (!measure.shift_B.isZero(0.0))
     add_rows(at.states, at.when, measure.shift_B, modal);
   for (std::size_t i = 0; i < rotation_.size(); ++i) modal[i] += rotation_[i].dot(measure.turn_B);
-  if (measure.along_bend != 0.0) {
-    const std::span<const double> z0 = at.states.amplitudes(body_, StepTime::kStart),
-                                  z1 = at.states.amplitudes(body_, StepTime::kEnd);
-    for (std::size_t i = 0; i < modal.size(); ++i) modal[i] += measure.along_bend * (z1[i] - z0[i]);
-  }
 }
 
 std::vector<SurfacePoint> patch_around(const ModalModel& model, SurfacePoint::Surface surface, const Vec3& center,

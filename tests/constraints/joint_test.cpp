@@ -295,6 +295,17 @@ TEST(Joint, WhatRestsTakesAnIterationAtMost) {
   EXPECT_LT(island.joint_error(), 1e-12);
 }
 
+/// However little links bend in a step, rows of its middle keep their digits.
+TEST(Joint, LinksThatBendEverMoreSlowlyTakeNoMoreIterations) {
+  Island island({.modes = 12, .lowest_hz = 50.0, .decay = 100.0}, kFrame);
+  add_chain(island, 3, {.type = JointType::kFixed});
+  for (int step = 0; step < 200; ++step) {
+    const IslandReport report = island.step();
+    EXPECT_EQ(report.status, IslandStatus::kSolved);
+    EXPECT_LE(report.iterations, 10) << "step " << step;
+  }
+}
+
 TEST(Joint, AWarmStepAllocatesNothingAsStopsAreHitAndLeft) {
   Island island({.modes = 6, .lowest_hz = 20.0, .decay = 1.0}, kFrame);
   JointSpec spec = hinge();

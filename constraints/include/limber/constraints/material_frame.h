@@ -28,7 +28,6 @@ namespace limber {
 struct FrameMeasure {
   Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();  ///< of the body, world, as in RowSide
   Vec3 shift_B = Vec3::Zero(), turn_B = Vec3::Zero();  ///< of the frame's origin by D ż, of its axes by Θ ż
-  double along_bend = 0.0;                             ///< of ż along what z changes by in the step
 };
 
 /// A frame at one time of a step. In the middle of it axes are the mean of both ends, not orthonormal.
@@ -41,11 +40,10 @@ struct FrameInstant {
   Vec3 origin = Vec3::Zero();    ///< of the body, world, m
   Mat3 R_BW = Mat3::Identity();  ///< in the middle R'ᵀ (BodyStates); this and what follows where modes show
   Mat3 axes_B = Mat3::Identity();
-  Mat3 turning = Mat3::Identity();  ///< what the axes turn by in the body per unit of Θ dz
-  Vec3 turned = Vec3::Zero();       ///< Θ z; in the middle Θ Δz,
-  Vec3 cayley = Vec3::Zero();       ///< the Cayley vector of the turn that it makes in the body,
-  double inverse_square = 0.0;      ///< and 1/|Δz|², 0 where nothing bends
-  bool bends = false;               ///< modes show: what is in body axes counts
+  /// What the axes turn by in the body per unit of Θ dz; in the middle the Cayley vector of all of it, of Θ Δz.
+  Mat3 turning = Mat3::Identity();
+  Vec3 turned = Vec3::Zero();  ///< Θ z, at the step's ends
+  bool bends = false;          ///< modes show: what is in body axes counts
 
   /// Adds the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
   /// @param p, n world
