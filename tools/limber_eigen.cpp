@@ -34,14 +34,12 @@ struct Arguments {
   std::string bodies, output;
   int modes = 64, of = 1;
   std::vector<double> band;
-  bool without_factor = false;
+  bool without_factor = false, estimate = false;
 };
 
 void declare_options(CLI::App& app, Arguments& a) {
   app.add_option("BODIES", a.bodies, "file that limber-precompute --bodies wrote")->required();
-  app.add_option("-o,--output", a.output, "file of slices to write, for limber-precompute --merge")
-      ->type_name("FILE")
-      ->required();
+  app.add_option("-o,--output", a.output, "file of slices to write, for limber-precompute --merge")->type_name("FILE");
   app.add_option("--modes", a.modes, "elastic modes wanted, the lowest")
       ->type_name("N")
       ->check(CLI::Range(1, 1'000'000))
@@ -52,12 +50,14 @@ void declare_options(CLI::App& app, Arguments& a) {
       ->expected(2);
   app.add_flag("--without-factor", a.without_factor,
                "by LOBPCG with multigrid, in less memory and without proof that no mode is missed");
+  app.add_flag("--estimate", a.estimate, "tell what the factor takes on this many processes, and compute nothing");
   app.add_option("--of", a.of, "how many slices there are in all")->type_name("N")->check(CLI::Range(1, 1'000'000));
 }
 
 double hz_of(double eigenvalue) { return std::sqrt(eigenvalue) / (2.0 * std::numbers::pi); }
 
 ParallelModes modes_of(DistributedBody& body, const Arguments& a) {
+  if (a.estimate) return internal::estimated_factor(body);
   if (a.without_factor) return internal::lowest_modes_without_factor(body, a.modes);
   if (a.band.empty()) return internal::lowest_parallel_modes(body, a.modes);
   const double unit = body.stored().eigenvalue_unit();
@@ -129,6 +129,7 @@ void expect_one_build() {
 
 Outcome compute(const Arguments& a) {
   expect_one_build();
+  if (a.output.empty() != a.estimate) throw InvalidArgument("--output is needed, and not for --estimate");
   if (!a.band.empty()) FrequencyBand{a.band[0], a.band[1]}.validate();
   if (a.without_factor && !a.band.empty())
     throw InvalidArgument("--slice counts by a factor: it and --without-factor exclude each other");
@@ -140,12 +141,13 @@ Outcome compute(const Arguments& a) {
     }
     DistributedBody body(a.bodies, stored);
     const ParallelModes modes = modes_of(body, a);
-    outcome.slices.push_back(slice_of(body, modes, a));
+    if (!a.estimate) outcome.slices.push_back(slice_of(body, modes, a));
     body.stages().lap("gather");
     nlohmann::ordered_json told{{"nodes", stored.nodes},
                                 {"modes", modes.lambda.size()},
                                 {"factor_entries", modes.factor_entries},
-                                {"factor_flops", modes.factor_flops}};
+                                {"factor_flops", modes.factor_flops},
+                                {"factor_memory_bytes", modes.factor_memory}};
     tell_seconds(body.stages(), told);
     outcome.bodies.push_back(std::move(told));
   }
@@ -154,13 +156,18 @@ Outcome compute(const Arguments& a) {
 }
 
 void tell(Program& program, const Arguments& a, Outcome outcome) {
+  for (const auto& body : a.estimate ? outcome.bodies : nlohmann::ordered_json())
+    program.print(
+        fmt::format("{} nodes: a factor of {:.3g} GB made by {:.3g} Gflop; MUMPS takes up to {:.3g} GB a process\n",
+                    body["nodes"].get<int>(), 8e-9 * body["factor_entries"].get<double>(),
+                    1e-9 * body["factor_flops"].get<double>(), 1e-9 * body["factor_memory_bytes"].get<double>()));
   for (const SpectrumSlice& slice : outcome.slices)
     program.print(fmt::format("{} to {} Hz: {} modes, {} eigenvalues below, {} below the upper end\n", slice.band.low,
                               slice.band.high, slice.modes(), slice.below_low, slice.below_high));
   program.report()["processes"] = processes();
   program.report()["bodies"] = std::move(outcome.bodies);
   program.report()["peak_memory_bytes"] = std::move(outcome.peak_memory_bytes);
-  program.write_file(a.output, slice_bytes(outcome.slices));
+  if (!a.estimate) program.write_file(a.output, slice_bytes(outcome.slices));
 }
 
 /// As limber-precompute does: threads that wait for each other cost more than they save on a busy machine.

@@ -113,11 +113,7 @@ void precompute_assembly(Program& program, const PrecomputeArguments& a, const B
 }
 
 /// The modes of a band, into a file of their own.
-void precompute_slice(Program& program, const PrecomputeArguments& a, const BakeInput& input,
-                      const BakeOptions& options) {
-  TbbJobs jobs;
-  std::vector<SpectrumSlice> slices =
-      bake_slices(input, options, {a.slice.band[0], a.slice.band[1]}, program.warnings(), jobs);
+void write_slices(Program& program, const PrecomputeArguments& a, std::vector<SpectrumSlice> slices) {
   nlohmann::ordered_json bodies = nlohmann::ordered_json::array();
   for (SpectrumSlice& slice : slices) {
     slice.of = a.slice.of;
@@ -169,10 +165,16 @@ void precompute(Program& program, const PrecomputeArguments& a) {
     const std::string bodies = bake_eigenproblems(input, options, program.warnings(), jobs);
     if (a.slice.bodies) return program.write_file(a.output, bodies);
     slices = stopwatch.time("eigen", [&] { return run_limber_eigen(program, a, bodies); });
-    if (!a.slice.band.empty()) return fs::rename(slices, a.output);
     options.analysis.slices = read_slices(slices);
+    if (!a.slice.band.empty()) {
+      write_slices(program, a, std::move(options.analysis.slices));
+      fs::remove(slices);
+      return;
+    }
   }
-  if (!a.slice.band.empty()) return precompute_slice(program, a, input, options);
+  if (!a.slice.band.empty())
+    return write_slices(program, a,
+                        bake_slices(input, options, {a.slice.band[0], a.slice.band[1]}, program.warnings(), jobs));
   const BakeResult result = bake(input, options, program.warnings(), jobs);
   program.progress().stage("writing");
   const std::string bytes = stopwatch.time("encode", [&] { return asset_bytes(result.asset); });

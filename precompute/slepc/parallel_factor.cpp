@@ -50,12 +50,12 @@ struct ParallelFactor::Mumps {
     control(7) = 1;                                                   // the given order
     control(12) = 1;                                                  // plain symmetric ordering
     control(13) = 1;   // the root front too is factored where its pivots are counted
-    control(14) = 50;  // per cent of workspace more than estimated, for pivots that are put off
+    control(14) = 20;  // per cent of workspace more than estimated, for pivots that are put off
     control(18) = 3;   // entries are where they were assembled
     control(20) = 10;  // loads too
     control(21) = 1;   // and answers where they fall
     control(28) = 1;   // analyses on the first process
-    control(31) = keeps == Keeps::kFactor ? 0 : 1;  // 1: forgets L
+    control(31) = keeps == Keeps::kPivotSigns ? 1 : 0;  // 1: forgets L
   }
   ~Mumps() { run(kEnd); }
   Mumps(const Mumps&) = delete;
@@ -102,11 +102,8 @@ struct ParallelFactor::Mumps {
 
   void prepare_solves() {
     solved_rows.resize(static_cast<std::size_t>(id.info[22]));
-    solution.resize(solved_rows.size());
     id.isol_loc = solved_rows.data();
-    id.sol_loc = solution.data();
-    id.lsol_loc = static_cast<MUMPS_INT>(solution.size());
-    id.nrhs = 1;
+    id.lsol_loc = static_cast<MUMPS_INT>(solved_rows.size());
     id.irhs_loc = own_rows.data();
     id.nloc_rhs = id.lrhs_loc = static_cast<MUMPS_INT>(own_rows.size());
   }
@@ -117,7 +114,7 @@ struct ParallelFactor::Mumps {
     for (PetscInt& r : rows) --r;
     const auto own = static_cast<PetscInt>(own_rows.size()), count = static_cast<PetscInt>(rows.size());
     check(VecCreateMPIWithArray(PETSC_COMM_WORLD, 1, own, id.n, nullptr, wanted.out()));
-    check(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, count, solution.data(), left.out()));
+    check(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, count, nullptr, left.out()));
     OwnedIndices from, to;
     check(ISCreateStride(PETSC_COMM_SELF, count, 0, 1, from.out()));
     check(ISCreateGeneral(PETSC_COMM_SELF, count, rows.data(), PETSC_COPY_VALUES, to.out()));
@@ -127,7 +124,7 @@ struct ParallelFactor::Mumps {
 
 ParallelFactor::ParallelFactor(OwnedMat A, const std::vector<int>& place_in_order, Keeps keeps, Stages& stages)
     : mumps_(std::make_unique<Mumps>(keeps)) {
-  const auto lap = [&](const char* stage) { stages.lap(keeps == Keeps::kFactor ? stage : "certify"); };
+  const auto lap = [&](const char* stage) { stages.lap(keeps == Keeps::kPivotSigns ? "certify" : stage); };
   mumps_->take_lower_triangle(A);
   A.reset();
   mumps_->order.assign(place_in_order.begin(), place_in_order.end());
@@ -135,6 +132,7 @@ ParallelFactor::ParallelFactor(OwnedMat A, const std::vector<int>& place_in_orde
   lap("assemble");
   mumps_->analyse();
   lap("analyse");
+  if (keeps == Keeps::kEstimate) return;
   mumps_->factorise();
   lap("factor");
   if (keeps == Keeps::kFactor) mumps_->prepare_solves();
@@ -146,24 +144,35 @@ ParallelFactor::~ParallelFactor() = default;
 int ParallelFactor::negative_pivots() const { return mumps_->id.infog[11]; }
 
 double ParallelFactor::entries() const {
-  const double entries = mumps_->id.infog[28];
+  const bool made = mumps_->id.job != kAnalyse;
+  const double entries = mumps_->id.infog[made ? 28 : 19];
   return entries < 0.0 ? -1e6 * entries : entries;  // MUMPS counts in millions where there are many
 }
 
-double ParallelFactor::flops() const { return mumps_->id.rinfog[2]; }
+double ParallelFactor::flops() const { return mumps_->id.rinfog[mumps_->id.job != kAnalyse ? 2 : 0]; }
 
-Eigen::VectorXd ParallelFactor::solve(const Eigen::VectorXd& b) {
-  Eigen::VectorXd x = b;
-  mumps_->id.rhs_loc = x.data();
-  mumps_->run(kSolve);
-  if (mumps_->id.infog[0] < 0) mumps_->fail();
-  if (!mumps_->scatter) mumps_->prepare_scatter();
-  const VecScatter scatter = mumps_->scatter;
-  check(VecPlaceArray(mumps_->wanted, x.data()));
-  check(VecScatterBegin(scatter, mumps_->left, mumps_->wanted, INSERT_VALUES, SCATTER_FORWARD));
-  check(VecScatterEnd(scatter, mumps_->left, mumps_->wanted, INSERT_VALUES, SCATTER_FORWARD));
-  check(VecResetArray(mumps_->wanted));
-  return x;
+double ParallelFactor::largest_memory() const { return 1e6 * mumps_->id.infog[15]; }
+
+Eigen::MatrixXd ParallelFactor::solve(const Eigen::MatrixXd& B) {
+  Eigen::MatrixXd X = B;
+  if (X.cols() == 0) return X;
+  Mumps& mumps = *mumps_;
+  mumps.solution.resize(mumps.solved_rows.size() * static_cast<std::size_t>(X.cols()));
+  mumps.id.nrhs = static_cast<MUMPS_INT>(X.cols());
+  mumps.id.rhs_loc = X.data();
+  mumps.id.sol_loc = mumps.solution.data();
+  mumps.run(kSolve);
+  if (mumps.id.infog[0] < 0) mumps.fail();
+  if (!mumps.scatter) mumps.prepare_scatter();
+  for (Eigen::Index c = 0; c < X.cols(); ++c) {
+    check(VecPlaceArray(mumps.left, mumps.solution.data() + static_cast<std::size_t>(c) * mumps.solved_rows.size()));
+    check(VecPlaceArray(mumps.wanted, X.col(c).data()));
+    check(VecScatterBegin(mumps.scatter, mumps.left, mumps.wanted, INSERT_VALUES, SCATTER_FORWARD));
+    check(VecScatterEnd(mumps.scatter, mumps.left, mumps.wanted, INSERT_VALUES, SCATTER_FORWARD));
+    check(VecResetArray(mumps.wanted));
+    check(VecResetArray(mumps.left));
+  }
+  return X;
 }
 
 }  // namespace limber::internal

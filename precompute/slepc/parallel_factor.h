@@ -14,7 +14,7 @@ namespace limber::internal {
 
 class ParallelFactor {
  public:
-  enum class Keeps { kFactor, kPivotSigns };
+  enum class Keeps { kFactor, kPivotSigns, kEstimate };  ///< the last: analyses alone
   /// Collective, as all below. @param A is released before it is factored
   /// @param place_in_order of each row, from 1; looked at on the first process alone
   /// @param stages takes "assemble", since the last lap, "analyse" and "factor", or all as "certify"
@@ -24,9 +24,11 @@ class ParallelFactor {
   ~ParallelFactor();
 
   int negative_pivots() const;
-  Eigen::VectorXd solve(const Eigen::VectorXd& b);
-  double entries() const;  ///< of L, in all
-  double flops() const;    ///< that made it
+  /// All columns at once: reading the factor from memory is most of the time.
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& B);
+  double entries() const;         ///< of L, in all; estimated where it is not made
+  double flops() const;           ///< that make it
+  double largest_memory() const;  ///< estimated bytes that MUMPS takes in the process that has most
 
  private:
   struct Mumps;

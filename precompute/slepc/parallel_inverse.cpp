@@ -31,8 +31,7 @@ Eigen::MatrixXd ParallelInverse::balanced(const Eigen::Ref<const Eigen::MatrixXd
 Eigen::MatrixXd ParallelInverse::apply(const Eigen::Ref<const Eigen::MatrixXd>& F) {
   Eigen::MatrixXd B = balanced(F);
   if (shift_ == 0.0) B(body_.pinned_rows(), Eigen::all).setZero();
-  Eigen::MatrixXd U(B.rows(), B.cols());
-  for (Eigen::Index c = 0; c < B.cols(); ++c) U.col(c) = factor_.solve(B.col(c));
+  Eigen::MatrixXd U = factor_.solve(B);
   U -= body_.N() * DistributedBody::dot(body_.MN(), U);
   return U;
 }

@@ -239,6 +239,7 @@ int count_below(DistributedBody& body, double lambda) {
 void describe(const ParallelFactor& factor, ParallelModes& modes) {
   modes.factor_entries = factor.entries();
   modes.factor_flops = factor.flops();
+  modes.factor_memory = factor.largest_memory();
 }
 
 /// Keeps those between the ends.
@@ -275,6 +276,15 @@ ParallelModes lowest_parallel_modes(DistributedBody& body, int wanted) {
     if (missing < 0 || search == kSearches) fail_to_complete(modes.below_low + end, modes.below_high);
   }
   take(pairs, modes);
+  return modes;
+}
+
+ParallelModes estimated_factor(DistributedBody& body) {
+  ParallelModes modes;
+  modes.W.resize(body.own_size(), 0);
+  describe(ParallelFactor(body.pinned_stiffness(), body.elimination_order(), ParallelFactor::Keeps::kEstimate,
+                          body.stages()),
+           modes);
   return modes;
 }
 

@@ -164,6 +164,7 @@ TEST_F(Engines, TellWhatIsWrongInOneLineAndLeaveNothingBehind) {
   };
   EXPECT_THAT(error({"--engine", "slepc", "--modes", "400"}), HasSubstr("use --engine arpack"));
   EXPECT_THAT(error({"--processes", "2"}), HasSubstr("--engine"));
+  EXPECT_THAT(error({"--bodies", "--engine", "slepc"}), HasSubstr("--bodies excludes --engine"));
 }
 
 TEST_F(Engines, SayWhatIsLostWithAProcessThatIsKilled) {

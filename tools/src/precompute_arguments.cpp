@@ -372,6 +372,8 @@ void read_slices_of(Program& program, const PrecomputeArguments& a, bool modes_g
   if (!a.slice.band.empty() && !a.slice.merge.empty()) throw InvalidArgument("--slice and --merge exclude each other");
   if (a.slice.by_processes() && !a.slice.merge.empty())
     throw InvalidArgument("--engine and --merge exclude each other");
+  if (a.slice.bodies && (a.slice.by_processes() || !a.slice.band.empty() || !a.slice.merge.empty()))
+    throw InvalidArgument("--bodies excludes --engine, --slice and --merge");
   if (!a.slice.by_processes() && a.slice.processes != 1)
     throw InvalidArgument("--processes is for --engine slepc and lobpcg, which are not given");
   std::map<std::string, int> modes;  // of each body
