@@ -1,4 +1,4 @@
-// Time of finding which triangles of two deforming bodies may touch: boxes from amplitudes, refit, and FCL. See
+// Time of finding which triangles of two deforming bodies may touch: by boxes from amplitudes, and FCL. See
 // README.md.
 #include <benchmark/benchmark.h>
 #include <fcl/geometry/bvh/BVH_model.h>
@@ -156,9 +156,9 @@ struct Query {
   DeformedSurface a, b;
   std::vector<TrianglePair> pairs;
 
-  void run(const Pair& pair, const State& state, BoundsChoice choice) {
-    a.bind(pair.a, state.z_a, choice);
-    b.bind(pair.b, state.z_b, choice);
+  void run(const Pair& pair, const State& state) {
+    a.bind(pair.a, state.z_a);
+    b.bind(pair.b, state.z_b);
     pairs.clear();
     find_triangle_pairs(a, b, state.X_AB, 0.0, pairs);
   }
@@ -227,51 +227,20 @@ class FclPair {
   fcl::Transform3<double> X_ = fcl::Transform3<double>::Identity();
 };
 
-/// Times of a way of answering over the steps, s.
-struct Wave {
-  double mean = 0.0;            // of all
-  std::vector<double> of_step;  // with the clock's own time, half a microsecond
-
-  Wave(const Pair& bodies, BoundsChoice choice) : of_step(kSteps) {
-    std::vector<State> states;
-    for (int step = 0; step < kSteps; ++step) states.push_back(bodies.at(step));
-    constexpr int kRounds = 4;
-    Query query;
-    const auto answer = [&](std::size_t i) { query.run(bodies, states[i], choice); };
-    LeastTime all;
-    std::vector<LeastTime> each(kSteps);
-    for (int round = 0; round < kRounds; ++round) {
-      all.measure([&] {
-        for (std::size_t i = 0; i < kSteps; ++i) answer(i);
-      });
-      for (std::size_t i = 0; i < kSteps; ++i) each[i].measure([&] { answer(i); });
-    }
-    mean = all.seconds() / kSteps;
-    for (std::size_t i = 0; i < kSteps; ++i) of_step[i] = each[i].seconds();
-  }
-  double sum() const { return std::accumulate(of_step.begin(), of_step.end(), 0.0); }
-};
-
-/// range(0) scene, range(1) large, range(2) modes. `best` takes the cheaper of boxes from amplitudes and refit in each
-/// step.
+/// range(0) scene, range(1) large, range(2) modes.
 void pair(benchmark::State& state) {
   const auto scene = static_cast<Scene>(state.range(0));
   const Pair bodies(scene, state.range(1) != 0, static_cast<Index>(state.range(2)));
+  std::vector<State> states;
+  for (int step = 0; step < kSteps; ++step) states.push_back(bodies.at(step));
+  Query query;
   for (auto _ : state) {
-    const Wave lazy(bodies, BoundsChoice::kAmplitudes), refit(bodies, BoundsChoice::kRefit),
-        automatic(bodies, BoundsChoice::kAutomatic);
-    double best = 0.0;
-    int lazy_wins = 0;
-    for (std::size_t i = 0; i < kSteps; ++i) {
-      best += std::min(lazy.of_step[i], refit.of_step[i]);
-      lazy_wins += lazy.of_step[i] < refit.of_step[i] ? 1 : 0;
-    }
-    state.counters["lazy_us"] = 1e6 * lazy.mean;
-    state.counters["refit_us"] = 1e6 * refit.mean;
-    state.counters["automatic_us"] = 1e6 * automatic.mean;
-    state.counters["automatic_over_refit"] = automatic.mean / refit.mean;
-    state.counters["automatic_over_best"] = automatic.sum() / best;
-    state.counters["lazy_is_best_percent"] = 100.0 * lazy_wins / kSteps;
+    LeastTime all;
+    for (int round = 0; round < 4; ++round)
+      all.measure([&] {
+        for (const State& now : states) query.run(bodies, now);
+      });
+    state.counters["us"] = 1e6 * all.seconds() / kSteps;
   }
   state.SetLabel(kSceneNames[scene]);
 }
@@ -281,7 +250,7 @@ void fcl_pair(benchmark::State& state) {
   const Pair bodies(scene, state.range(1) != 0, static_cast<Index>(state.range(2)));
   const State now{bodies.X_AB, bodies.z_a, bodies.z_b};
   FclPair fcl(bodies);
-  Query automatic;
+  Query query;
   double refit = 0.0, collide = 0.0, own = 0.0;
   for (auto _ : state) {
     LeastTime refit_time, collide_time;
@@ -289,23 +258,22 @@ void fcl_pair(benchmark::State& state) {
     for (int i = 0; i < 3; ++i) collide_time.measure([&] { fcl.collide(); });
     refit = refit_time.seconds(), collide = collide_time.seconds();
     own = least_seconds(
-        state, [&] { automatic.run(bodies, now, BoundsChoice::kAutomatic); }, 3);
+        state, [&] { query.run(bodies, now); }, 3);
   }
   state.SetLabel(kSceneNames[scene]);
   state.counters["fcl_refit_us"] = 1e6 * refit;
   state.counters["fcl_collide_us"] = 1e6 * collide;
-  state.counters["automatic_us"] = 1e6 * own;
-  state.counters["fcl_over_automatic"] = (refit + collide) / own;
+  state.counters["us"] = 1e6 * own;
+  state.counters["fcl_over_limber"] = (refit + collide) / own;
   state.counters["contacts"] = static_cast<double>(fcl.contacts);
 }
 
-/// range(0) modes, range(1) triangles per leaf, range(2) large: one box from amplitudes, one refit.
+/// range(0) modes, range(1) triangles per leaf, range(2) large: one box, one vertex.
 void boxes(benchmark::State& state) {
   const Pair bodies(kFar, state.range(2) != 0, static_cast<Index>(state.range(0)), static_cast<int>(state.range(1)));
   DeformedSurface body;
   const auto nodes = static_cast<Index>(bodies.a->nodes().size());
-  double all = 0.0, refit = 0.0, vertices = 0.0, reconstruction = 0.0;
-  std::vector<float> xyz(3 * static_cast<std::size_t>(bodies.a->vertices()));
+  double all = 0.0, vertices = 0.0;
   for (auto _ : state) {
     all = least_seconds(
         state,
@@ -314,11 +282,6 @@ void boxes(benchmark::State& state) {
           for (Index n = 0; n < nodes; ++n) benchmark::DoNotOptimize(body.bounds(n));
         },
         3);
-    refit = least_seconds(
-        state, [&] { body.bind(bodies.a, bodies.z_a, BoundsChoice::kRefit); }, 3);
-    const ReconstructionTarget target{.amplitudes = bodies.z_a.data(), .positions = xyz.data()};
-    reconstruction = least_seconds(
-        state, [&] { reconstruct(bodies.a->model()->collision(), std::span(&target, 1)); }, 3);
     vertices = least_seconds(
         state,
         [&] {
@@ -329,8 +292,6 @@ void boxes(benchmark::State& state) {
   }
   state.counters["box_ns"] = 1e9 * all / nodes;
   state.counters["vertex_ns"] = 1e9 * vertices / bodies.a->vertices();
-  state.counters["refit_us"] = 1e6 * refit;
-  state.counters["refit_tree_ns_per_triangle"] = 1e9 * (refit - reconstruction) / bodies.a->triangles();
   state.counters["triangles"] = bodies.a->triangles();
 }
 

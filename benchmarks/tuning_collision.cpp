@@ -59,10 +59,6 @@ double between_bounds(double x, double factor) { return factor < 1.0 ? 0.5 * x :
 #define LIMBER_NUMBER(room, name) LIMBER_NUMBER_BY(room, name, multiplied)
 
 const std::vector<Number> kNumbers{
-    LIMBER_NUMBER(hierarchy, box_cost),
-    LIMBER_NUMBER(hierarchy, box_cost_per_mode),
-    LIMBER_NUMBER(hierarchy, vertex_cost_per_mode),
-    LIMBER_NUMBER(hierarchy, triangle_cost),
     LIMBER_NUMBER(broad, moves_before_sort),
     LIMBER_NUMBER(broad, rows_per_chunk),
     LIMBER_NUMBER(convex, hull_thickness),
@@ -182,7 +178,6 @@ class Scenes {
   }
 
   void run(const std::string& room) {
-    if (room == "hierarchy") walk_trees();
     if (room == "broad") sweep();
     if (room == "convex")
       for (std::size_t i = convex_from_; i < pairs_.size(); ++i) contacts_of(pairs_[i]);
@@ -237,24 +232,6 @@ class Scenes {
     return impact_.find(shot.ball, sheet, kStep, 1e-4);
   }
 
-  /// Two vibrating balls of 1,280 triangles that come near, touch and part, by the automatic choice of boxes.
-  void walk_trees() {
-    for (const auto& surface : {spheres_[0], spheres_[1]}) {
-      DeformedSurface a, b;
-      std::vector<TrianglePair> pairs;
-      for (int step = 0; step < 100; ++step) {
-        std::vector<double> z;
-        for (Index i = 0; i < surface->modes(); ++i)
-          z.push_back(0.02 * std::sin(0.2 * step * (1 + i)) / (1.0 + 0.6 * i));
-        a.bind(surface, z, BoundsChoice::kAutomatic), b.bind(surface, z, BoundsChoice::kAutomatic);
-        pairs.clear();
-        const RigidTransform X{quaternion_from_rotation_vector({0.1, 0.2, 0.01 * step}),
-                               {1.0 + 0.06 * std::sin(0.1 * step), 0.0, 0.0}};
-        find_triangle_pairs(a, b, X, 0.0, pairs);
-      }
-    }
-  }
-
   void make_crossing_boxes() {
     Random random(76);
     for (int i = 0; i < 2000; ++i) places_.push_back(random.vector(7.0)), speeds_.push_back(random.vector(0.05));
@@ -277,9 +254,6 @@ class Scenes {
   std::size_t convex_from_ = 0;
   std::vector<Shot> shots_;
   std::vector<Vec3> places_, speeds_;
-  const std::shared_ptr<const CollisionSurface> spheres_[2] = {
-      std::make_shared<const CollisionSurface>(testing::wavy_model(shapes::sphere(Vec3::Zero(), 0.5, 4), 8)),
-      std::make_shared<const CollisionSurface>(testing::wavy_model(shapes::sphere(Vec3::Zero(), 0.5, 4), 32))};
   NarrowPhase nearest_{{.overlap = OverlapMethod::kNearestPoint}}, tets_{{.normals = tet_overlap_normals}},
       rest_{{.overlap = OverlapMethod::kRestDepth}};
   const RigidGeometry ball_{Sphere{0.01}};

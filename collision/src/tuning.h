@@ -10,18 +10,6 @@
 
 namespace limber::internal {
 
-/// Trees of surfaces. These decide how fast boxes are found and nothing else.
-///
-/// BoundsChoice::kAutomatic refits a tree once as many boxes have been asked for as cost the same. Costs are in floats
-/// read from the near cache, for k modes, fitted by hand to benchmark_collision_hierarchy; within 8 % at half and
-/// twice.
-struct HierarchyTuning {
-  double box_cost = 1000.0;           ///< of a box beside what grows with k: the tests and vertices it leads to [> 0]
-  double box_cost_per_mode = 48.0;    ///< of a box, times k: 6 half floats, scattered in memory [6 to 100]
-  double vertex_cost_per_mode = 3.0;  ///< of a vertex of a refit, times k: three floats, which stream [3]
-  double triangle_cost = 32.0;        ///< of a triangle of a refit, with its share of vertices and nodes [10 to 100]
-};
-
 /// Lists of many bodies. These decide time alone. Steady.
 struct BroadTuning {
   /// Moves per body after which insertion stops and the list is sorted anew [2 to log2 of the number of bodies].
@@ -174,7 +162,6 @@ struct FieldTuning {
 };
 
 struct CollisionTuning {
-  HierarchyTuning hierarchy{};
   BroadTuning broad{};
   ConvexTuning convex{};
   NarrowTuning narrow{};

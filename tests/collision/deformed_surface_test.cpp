@@ -62,28 +62,16 @@ TEST(DeformedSurface, BoxesOfEveryNodeEncloseItsVertices) {
     }
 }
 
-TEST(DeformedSurface, RefittedBoxesEncloseToo) {
-  Random random(4);
-  const auto surface = wavy_sphere(2, 12);
-  DeformedSurface body;
-  for (int trial = 0; trial < 1000; ++trial) {
-    body.bind(surface, random.amplitudes(12, std::pow(10.0, random.uniform(-12.0, 6.0))), BoundsChoice::kRefit);
-    expect_all_enclosed(body);
-    if (HasFatalFailure()) return;
-  }
-}
-
 TEST(DeformedSurface, BoxesEncloseOnEveryInstructionSet) {
   for_each_instruction_set([](std::int64_t) {
     Random random(5);
     const auto surface = wavy_sphere(1, 21);
     DeformedSurface body;
-    for (const BoundsChoice choice : {BoundsChoice::kAmplitudes, BoundsChoice::kRefit})
-      for (int trial = 0; trial < 50; ++trial) {
-        body.bind(surface, random.amplitudes(21, std::pow(10.0, random.uniform(-6.0, 6.0))), choice);
-        expect_all_enclosed(body);
-        if (HasFatalFailure()) return;
-      }
+    for (int trial = 0; trial < 50; ++trial) {
+      body.bind(surface, random.amplitudes(21, std::pow(10.0, random.uniform(-6.0, 6.0))));
+      expect_all_enclosed(body);
+      if (HasFatalFailure()) return;
+    }
   });
 }
 
@@ -110,12 +98,11 @@ TEST(DeformedSurface, BoxesEncloseFarFromTheOriginAndAtTinyScales) {
     for (Vec3& p : mesh.vertices) p *= scale;
     const auto surface = wavy_surface(mesh, 9);
     DeformedSurface body;
-    for (int trial = 0; trial < 50; ++trial)
-      for (const BoundsChoice choice : {BoundsChoice::kAmplitudes, BoundsChoice::kRefit}) {
-        body.bind(surface, random.amplitudes(9, scale * std::pow(10.0, random.uniform(-9.0, 3.0))), choice);
-        expect_all_enclosed(body);
-        if (HasFatalFailure()) return;
-      }
+    for (int trial = 0; trial < 50; ++trial) {
+      body.bind(surface, random.amplitudes(9, scale * std::pow(10.0, random.uniform(-9.0, 3.0))));
+      expect_all_enclosed(body);
+      if (HasFatalFailure()) return;
+    }
   }
 }
 
@@ -170,17 +157,16 @@ TEST(DeformedSurface, DegenerateSurfacesAreEnclosed) {
     const auto surface = wavy_surface(mesh, 5, 1);
     DeformedSurface body;
     for (int trial = 0; trial < 100; ++trial) {
-      body.bind(surface, random.amplitudes(5, 10.0), trial % 2 ? BoundsChoice::kAmplitudes : BoundsChoice::kRefit);
+      body.bind(surface, random.amplitudes(5, 10.0));
       expect_all_enclosed(body);
     }
   }
 }
 
-TEST(DeformedSurface, ARigidSurfaceHasConstantBoxesAndNoRefit) {
+TEST(DeformedSurface, ARigidSurfaceHasConstantBoxes) {
   const auto surface = std::make_shared<const CollisionSurface>(Box{.half_extents = {1.0, 2.0, 3.0}});
   DeformedSurface body;
-  body.bind(surface, {}, BoundsChoice::kRefit);
-  EXPECT_EQ(body.counters().refits, 0);
+  body.bind(surface, {});
   expect_all_enclosed(body);
   const Aabb box = body.bounds(0);
   constexpr double kGuard = 64 * 0x1p-24 * 3.0;  // the guard: some ulps of a float of size 3
@@ -194,17 +180,6 @@ TEST(DeformedSurface, TheWholeBodysBoxCostsOneBoxAndNoVertex) {
   (void)body.bounds(0);
   EXPECT_EQ(body.counters().boxes, 1);
   EXPECT_EQ(body.counters().vertices, 0);
-  EXPECT_EQ(body.counters().refits, 0);
-}
-
-TEST(DeformedSurface, AutomaticRefitsWhenMostBoxesAreWanted) {
-  const auto surface = wavy_sphere(4, 16);
-  DeformedSurface body;
-  body.bind(surface, std::vector<double>(16, 0.01), BoundsChoice::kAutomatic);
-  (void)body.bounds(0);
-  EXPECT_EQ(body.counters().refits, 0);
-  expect_all_enclosed(body);
-  EXPECT_EQ(body.counters().refits, 1);
 }
 
 TEST(DeformedSurface, AStateIsForgottenWithTheNextOne) {
@@ -213,9 +188,9 @@ TEST(DeformedSurface, AStateIsForgottenWithTheNextOne) {
   Random random(9);
   for (int trial = 0; trial < 20; ++trial) {
     const std::vector<double> z = random.amplitudes(6, 1.0);
-    reused.bind(surface, z, trial % 3 ? BoundsChoice::kAmplitudes : BoundsChoice::kRefit);
+    reused.bind(surface, z);
     fresh = DeformedSurface();
-    fresh.bind(surface, z, trial % 3 ? BoundsChoice::kAmplitudes : BoundsChoice::kRefit);
+    fresh.bind(surface, z);
     for (Index n = 0; n < static_cast<Index>(surface->nodes().size()); ++n) {
       EXPECT_EQ(reused.bounds(n).low, fresh.bounds(n).low);
       EXPECT_EQ(reused.bounds(n).high, fresh.bounds(n).high);
@@ -229,13 +204,11 @@ TEST(DeformedSurface, WarmBindingAndReadingAllocateNothing) {
   const std::vector<double> z(24, 0.01), y(5, 0.02);
   DeformedSurface body;
   const auto all = [&] {
-    for (const BoundsChoice choice : {BoundsChoice::kAmplitudes, BoundsChoice::kRefit, BoundsChoice::kAutomatic}) {
-      body.bind(large, z, choice);
-      for (Index n = 0; n < static_cast<Index>(large->nodes().size()); ++n) (void)body.bounds(n);
-      for (Index v = 0; v < large->vertices(); ++v) (void)body.vertex(v);
-      body.bind(small, y, choice);
-      (void)body.bounds(0);
-    }
+    body.bind(large, z);
+    for (Index n = 0; n < static_cast<Index>(large->nodes().size()); ++n) (void)body.bounds(n);
+    for (Index v = 0; v < large->vertices(); ++v) (void)body.vertex(v);
+    body.bind(small, y);
+    (void)body.bounds(0);
   };
   all();
   const long before = testing::allocations();

@@ -52,7 +52,7 @@ void check_query(const char* finder, const ContactQuery& query) {
 void bind_state(const char* finder, Index body, DeformedSurface& root,
                 const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z) {
   try {
-    root.bind(surface, z, BoundsChoice::kAmplitudes);
+    root.bind(surface, z);
   } catch (const InvalidArgument& e) {
     refuse(finder, body, e.what(), "smaller amplitudes");
   }

@@ -17,8 +17,7 @@ class SurfacePool {
 
   /// The surface of a body in the query's state; the last four that were asked for stay. A body finds the room that it
   /// had in earlier queries, so that nothing grows once all bodies were asked for.
-  DeformedSurface& get(Index body, const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
-                       BoundsChoice choice = BoundsChoice::kAutomatic) {
+  DeformedSurface& get(Index body, const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z) {
     Slot* place = slots_.data();
     for (Slot& slot : slots_) {
       if (slot.body == body) {
@@ -28,7 +27,7 @@ class SurfacePool {
       if (slot.used < place->used) place = &slot;
     }
     if (place->body == body && place->query == query_) return place->use(++clock_);
-    place->surface.bind(surface, z, choice);
+    place->surface.bind(surface, z);
     place->body = body;
     place->query = query_;
     return place->use(++clock_);

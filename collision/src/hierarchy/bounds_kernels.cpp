@@ -37,27 +37,6 @@ HWY_ATTR void MakeBox(const StateView& state, const float* constants, const std:
   }
 }
 
-void GrowLeaf(const std::int32_t* vertices, std::int32_t count, const float* positions, float pad, NodeBox* box) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    float low = positions[3 * vertices[0] + static_cast<std::int32_t>(axis)], high = low;
-    for (std::int32_t i = 1; i < count; ++i) {
-      const float p = positions[3 * vertices[i] + static_cast<std::int32_t>(axis)];
-      low = p < low ? p : low, high = p > high ? p : high;
-    }
-    box->low[axis] = low - pad;
-    box->high[axis] = high + pad;
-  }
-}
-
-void Join(const NodeBox* children, NodeBox* box) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const float a = children[0].low[axis], b = children[1].low[axis], e = children[0].high[axis],
-                f = children[1].high[axis];
-    box->low[axis] = a < b ? a : b;
-    box->high[axis] = e > f ? e : f;
-  }
-}
-
 struct Sides {
   float center[3], half[3];
   explicit Sides(const NodeBox& box) {
@@ -144,24 +123,6 @@ HWY_INLINE HWY_ATTR void MakeBox(const StateView& state, const float* HWY_RESTRI
   const Quad half = hn::Add(hn::Load(four, constants + 4), hn::Min(by_mode, by_energy));
   hn::Store(hn::Sub(center, half), four, box->low);
   hn::Store(hn::Add(center, half), four, box->high);
-}
-
-HWY_INLINE HWY_ATTR void GrowLeaf(const std::int32_t* HWY_RESTRICT vertices, std::int32_t count,
-                                  const float* HWY_RESTRICT positions, float pad, NodeBox* box) {
-  const Four d;
-  Quad low = hn::LoadU(d, positions + 3 * vertices[0]), high = low;
-  for (std::int32_t i = 1; i < count; ++i) {
-    const Quad p = hn::LoadU(d, positions + 3 * vertices[i]);
-    low = hn::Min(low, p), high = hn::Max(high, p);
-  }
-  hn::Store(hn::Sub(low, hn::Set(d, pad)), d, box->low);
-  hn::Store(hn::Add(high, hn::Set(d, pad)), d, box->high);
-}
-
-HWY_INLINE HWY_ATTR void Join(const NodeBox* children, NodeBox* box) {
-  const Four d;
-  hn::Store(hn::Min(hn::Load(d, children[0].low), hn::Load(d, children[1].low)), d, box->low);
-  hn::Store(hn::Max(hn::Load(d, children[0].high), hn::Load(d, children[1].high)), d, box->high);
 }
 
 struct Sides {
@@ -287,18 +248,6 @@ HWY_ATTR void MakeDisplacement(const float* HWY_RESTRICT rows, std::size_t strid
   }
 }
 
-HWY_ATTR void RefitBoxes(const TreeNode* nodes, std::size_t count, const std::int32_t* leaf_vertices,
-                         const float* positions, float pad, std::uint32_t stamp, NodeBox* boxes) {
-  for (std::size_t n = count; n-- > 0;) {
-    const TreeNode& node = nodes[n];
-    if (node.leaf())
-      GrowLeaf(leaf_vertices + node.first, node.count, positions, pad, boxes + n);
-    else
-      Join(boxes + node.child, boxes + n);
-    boxes[n].stamp = stamp;
-  }
-}
-
 }  // namespace limber::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -308,7 +257,6 @@ namespace limber::internal {
 HWY_EXPORT(PrepareState);
 HWY_EXPORT(MakeBoxes);
 HWY_EXPORT(MakeDisplacement);
-HWY_EXPORT(RefitBoxes);
 HWY_EXPORT(BoxesWithin);
 
 StateSums prepare_state(const double* z, std::size_t modes, std::size_t stride, const double* largest,
@@ -323,11 +271,6 @@ void make_boxes(const StateView& state, const float* constants, const std::uint1
 
 void make_displacement(const float* rows, std::size_t stride, const double* z, std::size_t padded_modes, double* u) {
   HWY_DYNAMIC_DISPATCH(MakeDisplacement)(rows, stride, z, padded_modes, u);
-}
-
-void refit_boxes(const TreeNode* nodes, std::size_t count, const std::int32_t* leaf_vertices, const float* positions,
-                 float pad, std::uint32_t stamp, NodeBox* boxes) {
-  HWY_DYNAMIC_DISPATCH(RefitBoxes)(nodes, count, leaf_vertices, positions, pad, stamp, boxes);
 }
 
 std::uint64_t boxes_within(const BoxFrames& frames, const NodeBox& one, const NodeBox* many, std::size_t count,

@@ -53,11 +53,6 @@ void make_boxes(const StateView& state, const float* constants, const std::uint1
 /// @param z padded with zeros to a multiple of kBoundsLanes; the same bits on every instruction set with FMA
 void make_displacement(const float* rows, std::size_t stride, const double* z, std::size_t padded_modes, double* u);
 
-/// All boxes of a tree, children before parents, grown by `pad`; the
-/// leaves' ranges are of leaf_vertices. @param positions xyz per vertex and one float more
-void refit_boxes(const TreeNode* nodes, std::size_t count, const std::int32_t* leaf_vertices, const float* positions,
-                 float pad, std::uint32_t stamp, NodeBox* boxes);
-
 /// Where frame B lies as seen from A, in single precision, for the separating axis test along the axes of both.
 struct alignas(64) BoxFrames {
   float columns[3][4];  ///< of R_AB

@@ -59,8 +59,7 @@ CollisionSurface::CollisionSurface(std::shared_ptr<const ModalModel> model, cons
   build(surface.triangles, options);
 }
 
-CollisionSurface::Skin::Skin(const ModalModel& model)
-    : tiles(skin_influences(model, SurfacePoint::Surface::kCollision)), extent(model) {}
+CollisionSurface::Skin::Skin(const ModalModel& model) : extent(model) {}
 
 void CollisionSurface::scale_modes() {
   for (Index m = 0; m < modes_; ++m) {
@@ -148,7 +147,6 @@ void CollisionSurface::build(std::vector<Triangle> triangles, const CollisionSur
   build_edges();
   build_vertex_adjacency();
   build_tree(options.leaf_triangles);
-  list_leaf_vertices();
   build_bounds();
 }
 

@@ -23,9 +23,7 @@ struct DeformedSurface::Scratch {
     std::vector<double> rates{};
   };
 
-  /// Of this state. Boxes that a refit made carry stamp | kRefitted until someone asks for them.
-  std::uint32_t stamp = 0;
-  static constexpr std::uint32_t kRefitted = 0x80000000u;
+  std::uint32_t stamp = 0;  ///< of this state
 
   AlignedArray<internal::NodeBox> boxes;
   AlignedArray<internal::NodeBox>
@@ -36,8 +34,6 @@ struct DeformedSurface::Scratch {
   float norm = 0.0f;
   double farthest = 0.0;
   Skinned skinned{};
-  long boxes_before_refit = 0;   ///< kAutomatic: so many, then refit
-  std::vector<float> positions;  ///< of a refit: xyz, and one float more
 };
 
 namespace internal {

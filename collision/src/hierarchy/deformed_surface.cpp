@@ -7,8 +7,6 @@
 
 #include "hierarchy/deformed_scratch.h"
 #include "limber/core/error.h"
-#include "limber/dynamics/reconstruct.h"
-#include "tuning.h"
 
 namespace limber {
 
@@ -19,7 +17,6 @@ using internal::make_boxes;
 using internal::make_displacement;
 using internal::NodeBox;
 using internal::prepare_state;
-using internal::refit_boxes;
 using internal::StateSums;
 
 namespace {
@@ -29,14 +26,6 @@ constexpr double kUnitRoundOff = 0x1p-24;
 
 /// Nodes whose boxes are made at once: a node and its sibling, which lie side by side. The root stands alone.
 Index first_of_siblings(Index node) { return node == 0 ? 0 : node - (node + 1) % 2; }
-
-/// How many boxes from amplitudes cost as much as one refit.
-long boxes_per_refit(const CollisionSurface& surface) {
-  const double k = surface.modes();
-  const internal::HierarchyTuning& cost = internal::collision_tuning().hierarchy;
-  const double box = cost.box_cost_per_mode * k + cost.box_cost, vertex = cost.vertex_cost_per_mode * k;
-  return static_cast<long>((vertex * surface.vertices() + cost.triangle_cost * surface.triangles()) / box);
-}
 
 void store(const Vec3& low, const Vec3& high, std::uint32_t stamp, NodeBox& box) {
   for (int i = 0; i < 3; ++i) box.low[i] = static_cast<float>(low[i]), box.high[i] = static_cast<float>(high[i]);
@@ -54,8 +43,7 @@ std::span<const double> DeformedSurface::amplitudes() const {
   return std::span(scratch_->z.data(), static_cast<std::size_t>(surface_->modes()));
 }
 
-void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
-                           BoundsChoice choice) {
+void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z) {
   if (!surface) throw InvalidArgument("DeformedSurface::bind: the surface is null, expected one");
   if (z.size() != static_cast<std::size_t>(surface->modes()))
     throw InvalidArgument("DeformedSurface::bind: " + std::to_string(z.size()) + " amplitudes, expected " +
@@ -79,10 +67,6 @@ void DeformedSurface::bind(const std::shared_ptr<const CollisionSurface>& surfac
   set_skin(z, same_surface);
   counters_ = {};
   begin_state();
-
-  const long worth = surface->modes() > 0 ? boxes_per_refit(*surface) : std::numeric_limits<long>::max();
-  s.boxes_before_refit = choice == BoundsChoice::kAutomatic ? worth : std::numeric_limits<long>::max();
-  if (choice == BoundsChoice::kRefit) refit();
 }
 
 void DeformedSurface::reserve(const CollisionSurface& surface) {
@@ -92,7 +76,6 @@ void DeformedSurface::reserve(const CollisionSurface& surface) {
   const auto triangles = static_cast<std::size_t>(surface.triangles());
   if (s.triangle_boxes.size() < triangles) s.triangle_boxes = AlignedArray<NodeBox>(triangles);
   if (s.vertices.size() < vertices) s.vertices.resize(vertices);
-  if (surface.modes() > 0 && s.positions.size() < 3 * vertices + 1) s.positions.resize(3 * vertices + 1);
   if (s.amplitudes.size() < surface.bounds_.stride) {
     s.amplitudes = AlignedArray<float>(surface.bounds_.stride);
     s.magnitudes = AlignedArray<float>(surface.bounds_.stride);
@@ -128,10 +111,10 @@ double DeformedSurface::skin_extent(std::span<const double> change, std::span<do
   return surface_->skin_->extent.find(*scratch_->skinned.pose, amplitudes(), change, shape, scratch_->skinned.rates);
 }
 
-/// A stamp that nothing made so far carries; after 2³¹ states all stamps are wiped.
+/// A stamp that nothing made so far carries; after 2³² states all stamps are wiped.
 void DeformedSurface::begin_state() {
   Scratch& s = *scratch_;
-  if (++s.stamp < Scratch::kRefitted) return;
+  if (++s.stamp != 0) return;
   for (std::size_t i = 0; i < s.boxes.size(); ++i) s.boxes[i].stamp = 0;
   for (std::size_t i = 0; i < s.triangle_boxes.size(); ++i) s.triangle_boxes[i].stamp = 0;
   for (Scratch::Vertex& vertex : s.vertices) vertex.stamp = 0;
@@ -145,17 +128,13 @@ Aabb DeformedSurface::bounds(Index node) {
 
 void DeformedSurface::make_box(Index node) {
   Scratch& s = *scratch_;
-  if (counters_.boxes >= s.boxes_before_refit && counters_.refits == 0) refit();
   const auto first = static_cast<std::size_t>(first_of_siblings(node));
   const std::size_t count = node == 0 ? 1 : 2;
   NodeBox* boxes = s.boxes.data() + first;
-  if (boxes->stamp == (s.stamp | Scratch::kRefitted))
-    for (std::size_t i = 0; i < count; ++i) boxes[i].stamp = s.stamp;
-  else
-    make_boxes({s.amplitudes.data(), s.magnitudes.data(), s.norm, surface_->bounds_.stride},
-               surface_->bounds_.constants.data() + first * kNodeConstants,
-               surface_->bounds_.coefficients.data() + first * 6 * surface_->bounds_.stride, count, s.stamp, boxes);
-  if (surface_->skin() && boxes->stamp == s.stamp && counters_.refits == 0)
+  make_boxes({s.amplitudes.data(), s.magnitudes.data(), s.norm, surface_->bounds_.stride},
+             surface_->bounds_.constants.data() + first * kNodeConstants,
+             surface_->bounds_.coefficients.data() + first * 6 * surface_->bounds_.stride, count, s.stamp, boxes);
+  if (surface_->skin())
     for (std::size_t i = 0; i < count; ++i) carry_box(static_cast<Index>(first + i));
   counters_.boxes += static_cast<long>(count);
 }
@@ -214,26 +193,6 @@ const Vec3& DeformedSurface::vertex(Index v) {
 std::array<Vec3, 3> DeformedSurface::triangle(Index t) {
   const auto& [a, b, c] = surface_->triangle(t);
   return {vertex(a), vertex(b), vertex(c)};
-}
-
-void DeformedSurface::refit() {
-  if (surface_->modes() == 0 || counters_.refits > 0) return;
-  ++counters_.refits;
-  Scratch& s = *scratch_;
-  const ReconstructionTarget target{.amplitudes = s.z.data(), .positions = s.positions.data(), .skin = skin()};
-  if (surface_->skin())
-    reconstruct(surface_->model()->collision(), surface_->skin_->tiles, std::span(&target, 1));
-  else
-    reconstruct(surface_->model()->collision(), std::span(&target, 1));
-  // reconstruct()'s own error, the amplitudes' and the two roundings of the box, with some to spare.
-  const double terms = surface_->modes() + 24.0,
-               flexed = surface_->skin() ? s.skinned.flexed + s.skinned.carried : s.farthest;
-  const double pad = kUnitRoundOff * (terms * flexed + 24.0 * surface_->rest_radius_ +
-                                      (surface_->skin() ? 64.0 * (flexed + surface_->rest_radius_) : 0.0)) +
-                     internal::kBoxUnderflow;
-  refit_boxes(surface_->tree_.by_vertices.data(), surface_->tree_.by_vertices.size(),
-              surface_->tree_.leaf_vertices.data(), s.positions.data(), static_cast<float>(pad),
-              s.stamp | Scratch::kRefitted, s.boxes.data());
 }
 
 }  // namespace limber

@@ -81,22 +81,6 @@ void CollisionSurface::build_tree(int leaf_triangles) {
   }
 }
 
-void CollisionSurface::list_leaf_vertices() {
-  tree_.by_vertices = tree_.nodes;
-  for (TreeNode& node : tree_.by_vertices) {
-    if (!node.leaf()) continue;
-    const auto first = static_cast<Index>(tree_.leaf_vertices.size());
-    for (Index i = node.first; i < node.first + node.count; ++i)
-      for (const Index v : triangle(tree_.triangle_order[static_cast<std::size_t>(i)]))
-        tree_.leaf_vertices.push_back(v);
-    std::sort(tree_.leaf_vertices.begin() + first, tree_.leaf_vertices.end());
-    tree_.leaf_vertices.erase(std::unique(tree_.leaf_vertices.begin() + first, tree_.leaf_vertices.end()),
-                              tree_.leaf_vertices.end());
-    node.first = first;
-    node.count = static_cast<Index>(tree_.leaf_vertices.size()) - first;
-  }
-}
-
 void CollisionSurface::build_bounds() {
   const auto k = static_cast<std::size_t>(modes_);
   bounds_.stride = (k + kBoundsLanes - 1) / kBoundsLanes * kBoundsLanes;

@@ -51,9 +51,7 @@ void MovingSide::take_core(const Shape& shape) {
   }
 }
 
-void MovingSide::bind_shape(std::size_t place) {
-  ends_[place].shape.bind(surface_, ends_[place].amplitudes, BoundsChoice::kAutomatic);
-}
+void MovingSide::bind_shape(std::size_t place) { ends_[place].shape.bind(surface_, ends_[place].amplitudes); }
 
 void MovingSide::evaluate(double t, int end) {
   End& e = ends_[place(end)];

@@ -82,7 +82,7 @@ DeformedSurface& PairFinder::surface_of(const PairQuery& q, Side side) {
   const BodyState& state = is_a ? q.state_a : q.state_b;
   if (q.ahead == 0.0) return surface(is_a ? q.index_a : q.index_b, body, state);
   DeformedSurface& ahead = ahead_[is_a ? 0 : 1];
-  ahead.bind(body.modal->surface, state.amplitudes, BoundsChoice::kAutomatic);
+  ahead.bind(body.modal->surface, state.amplitudes);
   return ahead;
 }
 

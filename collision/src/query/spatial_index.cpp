@@ -146,8 +146,7 @@ struct SpatialIndex::Impl {
   DeformedSurface& surface(Index b) {
     const IndexedBody& body = bodies[static_cast<std::size_t>(b)];
     // Boxes from amplitudes alone: they, and so the order in which triangles are met, depend on the state only.
-    return pool.get(b, body.surface, body.bends() ? std::span<const double>(body.z) : std::span<const double>(),
-                    BoundsChoice::kAmplitudes);
+    return pool.get(b, body.surface, body.bends() ? std::span<const double>(body.z) : std::span<const double>());
   }
   bool admits(Index b, const Filter& filter) const {
     const IndexedBody& body = bodies[static_cast<std::size_t>(b)];
@@ -280,7 +279,7 @@ void SpatialIndex::Impl::tell_place(Hit& hit) {
   const IndexedBody& body = bodies[static_cast<std::size_t>(hit.body)];
   if (body.bends() || !body.loaded) return;
   const Index key = -2 - hit.body;  // beside the surface that is met
-  DeformedSurface& loaded = pool.get(key, body.loaded, body.z, BoundsChoice::kAmplitudes);
+  DeformedSurface& loaded = pool.get(key, body.loaded, body.z);
   const auto near = limber::nearest_point(loaded, body.in_loaded * (body.pose.inverse() * hit.position));
   if (near) hit.at = SurfacePoint{.triangle = near->triangle, .weight = near->weight};
 }

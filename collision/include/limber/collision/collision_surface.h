@@ -17,7 +17,6 @@
 #include "limber/core/types.h"
 #include "limber/dynamics/body_shape.h"
 #include "limber/dynamics/skin_extent.h"
-#include "limber/dynamics/skin_tiles.h"
 #include "limber/model/modal_model.h"
 #include "limber/model/shape.h"
 
@@ -115,12 +114,6 @@ class CollisionSurface {
   std::span<const TreeNode> nodes() const { return tree_.nodes; }
   const TreeNode& node(Index n) const { return tree_.nodes[static_cast<std::size_t>(n)]; }
   static constexpr int kMaxDepth = 32;
-  /// Distinct vertices of a leaf's triangles, ascending.
-  std::span<const Index> leaf_vertices(Index n) const {
-    const TreeNode& leaf = tree_.by_vertices[static_cast<std::size_t>(n)];
-    return std::span(tree_.leaf_vertices)
-        .subspan(static_cast<std::size_t>(leaf.first), static_cast<std::size_t>(leaf.count));
-  }
   /// Triangles below a node.
   std::span<const Index> node_triangles(Index n) const {
     return std::span(tree_.triangle_order)
@@ -156,15 +149,12 @@ class CollisionSurface {
   struct Tree {
     std::vector<TreeNode> nodes;
     std::vector<Index> triangle_order;  ///< nodes' ranges are of it
-    std::vector<Index> leaf_vertices;   ///< distinct vertices of each leaf
-    std::vector<TreeNode> by_vertices;  ///< the same nodes; a leaf's range is of leaf_vertices
   };
 
   /// What a body that bends by a modal skin has beside.
   struct Skin {
     explicit Skin(const ModalModel& model);
     std::vector<float> undeformed;  ///< Ũ, [vertex][axis][mode]
-    SkinTiles tiles;
     SkinExtent extent;
     Lists<std::uint8_t> node_handles;  ///< that the vertices below a node hang on
   };
@@ -189,7 +179,6 @@ class CollisionSurface {
   void build_edges();
   void build_vertex_adjacency();
   void build_tree(int leaf_triangles);
-  void list_leaf_vertices();
   void scale_modes();
   void build_bounds();
   void bound_node(std::size_t n, int axis, std::span<const Index> below);

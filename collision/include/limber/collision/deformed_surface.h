@@ -1,5 +1,6 @@
 /// @file limber/collision/deformed_surface.h
 /// One body's surface in one state: boxes and vertices made when someone asks for them, and kept until the next state.
+/// A box is made from the amplitudes alone (James and Pai's BD-tree, 2004, with boxes).
 ///
 ///   DeformedSurface body;
 ///   body.bind(surface, z);                 // O(k)
@@ -23,13 +24,6 @@
 
 namespace limber {
 
-/// How the boxes of a tree are made; all enclose, and none changes which triangles touch.
-enum class BoundsChoice {
-  kAmplitudes,  ///< each box when it is asked for, from the amplitudes alone (James and Pai's BD-tree, with boxes)
-  kRefit,       ///< all vertices, then all boxes from the leaves up (van den Bergen): tighter boxes
-  kAutomatic,   ///< kAmplitudes until so many boxes were asked for that a refit would have been cheaper, then kRefit
-};
-
 /// Scratch of one thread: reuse it, a warm one allocates nothing. All points are in the body frame, in m.
 class DeformedSurface {
  public:
@@ -37,7 +31,6 @@ class DeformedSurface {
   struct Counters {
     long boxes = 0;     ///< nodes whose box was asked for, siblings counted together
     long vertices = 0;  ///< made one by one, in double
-    long refits = 0;    ///< of the whole tree
   };
 
   DeformedSurface();
@@ -48,8 +41,7 @@ class DeformedSurface {
   /// A new state; forgets the last one. O(k). Allocates only for a surface larger than any before.
   /// @param surface not null; kept until the next bind()  @param z its k amplitudes, read here only
   /// @throws InvalidArgument if z has another size, is not finite, or moves a vertex by more than 1e30 m
-  void bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z,
-            BoundsChoice choice = BoundsChoice::kAmplitudes);
+  void bind(const std::shared_ptr<const CollisionSurface>& surface, std::span<const double> z);
 
   const CollisionSurface& surface() const { return *surface_; }
   std::span<const double> amplitudes() const;
@@ -65,9 +57,6 @@ class DeformedSurface {
   const Vec3& vertex(Index v);
   /// Corners of a triangle.
   std::array<Vec3, 3> triangle(Index t);
-
-  /// Makes all boxes from all vertices, now. Nothing to do for a rigid surface, whose boxes do not change.
-  void refit();
 
   const Counters& counters() const { return counters_; }
 
