@@ -47,12 +47,6 @@ void ConstraintRows::add_to(Side& side, const RowSide& other) {
   for (std::size_t i = 0; i < other.modal.size(); ++i) modal_[side.modal_begin + i] += other.modal[i];
 }
 
-void ConstraintRows::take_modal(const ConstraintRows& from, Index row, std::size_t side) {
-  const std::span<const double> modal = from.modal(from.row(row).sides[side]);
-  std::copy(modal.begin(), modal.end(),
-            modal_.begin() + static_cast<std::ptrdiff_t>(this->row(row).sides[side].modal_begin));
-}
-
 void IslandBodies::set(std::span<const ConstrainedBody> table, std::span<const Index> members) {
   members_.assign(members.begin(), members.end());
   bodies_.clear();

@@ -52,8 +52,6 @@ struct PartTuning {
   double last_part = 1.5;
   /// Rows up to which joints beside contacts are tried in the middle of the step: its matrices are dense. [path]
   std::size_t most_rows_in_the_middle = 80;
-  int most_bending = 20;       ///< steps of the fixed point of bending. [path]
-  double bending_met = 1e-11;  ///< of what bends the bodies
 };
 
 /// Augmented Lagrangian of contacts and what is beside them.

@@ -28,7 +28,6 @@ void ConvexRounds::iterate(IslandStep& step, IslandReport& report) {
   for (;; ++report.iterations) {
     take_impulses(step);
     step.predict();
-    if (step.skinned) fill_rows(step), contacts_.set_motion();
     const Distance left = find_starts(step, !begun_);
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.

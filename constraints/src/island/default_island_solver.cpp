@@ -42,14 +42,14 @@ void DefaultIslandSolver::write_slip(std::span<double> slip) const {
 void DefaultIslandSolver::find_middle(IslandReport& done) {
   if (step_.contacts_alone || step_.size() > kConstraintsTuning.parts.most_rows_in_the_middle) return;
   IslandReport middle;
-  step_.take_middle(true);
+  step_.mean = true;
   middle.accepted = mean_.solve(step_, middle, true) == SolveStatus::kSolved;
   middle.attempts[StepAttempt::kInTheMiddle] = 1;
   if (middle.accepted) {
     done = middle;
     return;
   }
-  step_.take_middle(false);
+  step_.mean = false;
   rounds_.take_again(step_);
 }
 

@@ -1,5 +1,4 @@
 #include "island_step.h"
-#include "../tuning.h"
 
 #include <algorithm>
 #include <cmath>
@@ -57,12 +56,7 @@ void IslandStep::begin(const StepPart& of, bool contacts_react) {
   measure(StepTime::kStart, start_gap);
   gap = start_gap;
   set_modal_steps();
-  if (!skinned) return;
-  metric_.resize(static_cast<std::size_t>(bodies.degrees_of_freedom()));
-  bodies.write_position_metric(length(), theta, metric_);
 }
-
-void IslandStep::take_middle(bool middle) { mean = middle, convex = !middle; }
 
 bool IslandStep::any_law(bool (*holds)(const RowParameters&)) const {
   for (Index i = 0; i < rows.size(); ++i)
@@ -74,10 +68,7 @@ void IslandStep::find_kind(bool contacts_react) {
   contacts_alone = !any_law([](const RowParameters& law) { return !law.contact; });
   touches = any_law([](const RowParameters& law) { return law.contact; });
   mean = !contacts_react && !touches;
-  convex = loads_at_start = !contacts_react && !mean;
-  skinned = false;
-  for (Index local = 0; local < bodies.count(); ++local)
-    skinned = skinned || bodies.body(local).group->skinned(bodies.body(local).slot);
+  loads_at_start = !contacts_react && !mean;
   theta = 1.0;
 }
 
@@ -104,7 +95,6 @@ void IslandStep::measure(StepTime when, std::vector<double>& into) const {
 
 void IslandStep::predict() {
   set_loads();
-  if (skinned) follow_bending();
   predict_under_loads();
 }
 
@@ -126,43 +116,6 @@ void IslandStep::move_under_loads() {
     if (loads_at_start) load_start(local, load);
     body.group->predict(body.slot, held_gravity(local), load, bodies.modal_step(local));
   }
-}
-
-/// What the modes bear bends the body, and by how it bends on its way its points tell what the modes bear: a map of
-/// modal loads to themselves, which the impulses stiffen and soften (by f · ∂²x/∂z²). Its fixed point is one answer to
-/// the impulses; a rows' way that lags behind would be another for every way to come to them.
-void IslandStep::follow_bending() {
-  const std::size_t n = loads.modes.size();
-  for (std::vector<double>* v : {&borne_change_, &bent_}) v->resize(n);
-  bending_.begin(n);
-  borne_ = loads.modes;
-  for (int i = 0;; ++i) {
-    move_under_loads();
-    bend_rows();
-    set_loads();
-    double all = 0.0, left = 0.0;
-    for (std::size_t k = 0; k < n; ++k) {
-      const double weight = std::sqrt(metric_[k]);
-      borne_change_[k] = loads.modes[k] - borne_[k];
-      bent_[k] = weight * borne_change_[k];
-      all = std::max(all, weight * std::abs(loads.modes[k]));
-      left = std::max(left, std::abs(bent_[k]));
-    }
-    if (!(left > kConstraintsTuning.parts.bending_met * all) || i == kConstraintsTuning.parts.most_bending) return;
-    bending_.advance(borne_, borne_change_, bent_);
-    loads.modes.assign(borne_.begin(), borne_.end());
-  }
-}
-
-/// By the way to where the bodies were predicted last.
-void IslandStep::bend_rows() {
-  linearise(StepTime::kMiddle, midpoint_rows);
-  for (Index i = 0; i < rows.size(); ++i)
-    for (std::size_t side = 0; side < 2; ++side) {
-      const Index local = bodies.local(rows.row(i).sides[side].body);
-      if (local >= 0 && bodies.body(local).group->skinned(bodies.body(local).slot))
-        rows.take_modal(midpoint_rows, i, side);
-    }
 }
 
 /// The frame's part. Modes of a free body do not feel gravity; those of one that is held somewhere have it over the

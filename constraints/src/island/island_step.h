@@ -9,7 +9,6 @@
 #include "../frame_at.h"
 #include "limber/constraints/island_solver.h"
 #include "limber/solvers/contact_potential.h"
-#include "limber/solvers/secant_iteration.h"
 
 namespace limber::internal {
 
@@ -60,9 +59,7 @@ struct IslandStep {
   IslandBodies bodies;
   ConstraintRows rows, end_rows, midpoint_rows;  // linearised at the start, at the predicted end and in the middle
   std::vector<Index> first_row;                  // per constraint, and the end
-  bool convex = false;                           // in rounds: with contacts
   bool contacts_alone = false;                   // among the rows
-  bool skinned = false;                          // some bodies bend by their modal skins
   bool mean = false;            // joints and the like: impulses act by the rows of the middle of the step
   bool touches = false;         // some rows are contacts
   bool loads_at_start = false;  // gravity and held forces come to the frames there, as impulses do
@@ -79,8 +76,6 @@ struct IslandStep {
   /// Linearises the rows. All impulses are zero. @param contacts_react contacts answer to held forces as other rows
   /// that hold do, which are half at the start: no row comes in rounds or in the middle of the step
   void begin(const StepPart& of, bool contacts_react);
-  /// Joints beside contacts: to be solved by the rows of the middle of the step, or in rounds.
-  void take_middle(bool middle);
   double length() const { return part.options.step; }
   std::size_t size() const { return f.size(); }
   const RowParameters& law(std::size_t row) const { return rows.row(static_cast<Index>(row)).law; }
@@ -97,8 +92,7 @@ struct IslandStep {
   }
 
   /// The bodies under θ f and the first half of the reaction at the start, their modes under all of both, held; and the
-  /// gaps there. Modes of bodies with a skin get of the impulses what moves the rows' points on the way to where the
-  /// bodies then are, so that the impulses do the work that the gaps tell: rows say it from then on.
+  /// gaps there.
   void predict();
   /// Under the loads as they are.
   void predict_under_loads();
@@ -123,14 +117,8 @@ struct IslandStep {
   Vec3 held_gravity(Index local) const;
   void set_loads();
   void move_under_loads();
-  void follow_bending();
-  void bend_rows();
   void find_kind(bool contacts_react);
   void set_modal_steps();
-
-  SecantIteration bending_;                            // of modal loads
-  std::vector<double> borne_, borne_change_, metric_;  // by degree of freedom
-  std::vector<double> bent_;                           // what changes of them bend
 };
 
 template <class Action>

@@ -28,7 +28,6 @@ SolveStatus RowNewton::iterate(IslandStep& step, const ContactRule& rule, Island
   secants_.begin(F_.size());
   for (report.iterations = 1;; ++report.iterations) {
     take(step, F_);
-    if (step.skinned) factor(step);
     const SolveStatus status = improve(step, rule);
     report.change = largest_change(step);
     if (report.change <= 1.0) return status;

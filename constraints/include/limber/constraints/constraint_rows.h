@@ -126,9 +126,6 @@ class ConstraintRows {
   /// What is stored in flexibilities at the step's start, J: ½ FᵀG F of the last step's forces.
   void add_stored_energy(double energy) { stored_energy_ += energy; }
 
-  /// Takes the modal part of one side of a row from rows of the same constraints at another time.
-  void take_modal(const ConstraintRows& from, Index row, std::size_t side);
-
   Index size() const { return size_; }
   const Row& row(Index i) const { return rows_[static_cast<std::size_t>(i)]; }
   Row& row(Index i) { return rows_[static_cast<std::size_t>(i)]; }
