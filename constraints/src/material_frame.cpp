@@ -1,11 +1,13 @@
 #include "limber/constraints/material_frame.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "limber/core/cross_matrix.h"
 #include "limber/core/error.h"
+#include "limber/mesh/patch_samples.h"
 #include "tuning.h"
 
 namespace limber {
@@ -23,16 +25,46 @@ Mat3 pseudo_inverse(const Mat3& inertia) {
   return inverse;
 }
 
-/// Of all points of a patch, in the mean.
-SkinInfluences mean_influences(const ModalModel& model, std::span<const SurfacePoint> patch) {
-  std::vector<double> weights(static_cast<std::size_t>(model.data().skin->handles), 0.0);
+const ModalSurface& surface_of(const ModalModel& model, const SurfacePoint& at) {
+  return at.surface == SurfacePoint::Surface::kRender ? model.render() : model.collision();
+}
+
+struct WeightedPoint {
+  SurfacePoint at;
+  double weight = 1.0;
+};
+
+/// What a patch is a mean over: of vertices of one surface the area between them, where there is any; else its points.
+std::vector<WeightedPoint> weighted_points(const ModalModel& model, std::span<const SurfacePoint> patch) {
+  const ModalSurface& s = surface_of(model, patch[0]);
+  std::vector<bool> inside(s.rest.size(), false);
+  bool vertices = true;
   for (const SurfacePoint& at : patch) {
-    const ModalSurface& s = at.surface == SurfacePoint::Surface::kRender ? model.render() : model.collision();
+    const auto corner = std::ranges::find(at.weight, 1.0) - at.weight.begin();
+    vertices = vertices && corner < 3 && at.surface == patch[0].surface;
+    if (!vertices) break;
     const Triangle& corners = s.triangles[static_cast<std::size_t>(at.triangle)];
+    inside[static_cast<std::size_t>(corners[static_cast<std::size_t>(corner)])] = true;
+  }
+  std::vector<WeightedPoint> points;
+  if (vertices)
+    for (const auto& [triangle, at, weight] :
+         patch_samples(s.triangles, inside, [&](std::size_t v) { return Vec3(s.rest[v].cast<double>()); }))
+      points.push_back({{patch[0].surface, triangle, at}, weight});
+  if (points.empty())
+    for (const SurfacePoint& at : patch) points.push_back({at, 1.0 / static_cast<double>(patch.size())});
+  return points;
+}
+
+/// Of all points of a patch, in the mean.
+SkinInfluences mean_influences(const ModalModel& model, std::span<const WeightedPoint> patch) {
+  std::vector<double> weights(static_cast<std::size_t>(model.data().skin->handles), 0.0);
+  for (const auto& [at, share] : patch) {
+    const Triangle& corners = surface_of(model, at).triangles[static_cast<std::size_t>(at.triangle)];
     for (std::size_t c = 0; c < 3; ++c) {
       const SkinInfluences& of = skin_influences(model, at.surface)[static_cast<std::size_t>(corners[c])];
       for (std::size_t i = 0; i < SkinInfluences::kMost; ++i)
-        weights[of.handle[i]] += at.weight[c] * static_cast<double>(of.weight[i]);
+        weights[of.handle[i]] += share * at.weight[c] * static_cast<double>(of.weight[i]);
     }
   }
   return skin_influences(weights);
@@ -102,7 +134,8 @@ MaterialFrame::MaterialFrame(Index body, const ModalModel& model, const SurfaceP
     if (at.weight[c] == 0.0) continue;
     SurfacePoint corner{.surface = at.surface, .triangle = at.triangle, .weight = {0.0, 0.0, 0.0}};
     corner.weight[c] = 1.0;
-    Anchor anchor{mean_influences(model, {&corner, 1}), rest_point(model, corner), at.weight[c]};
+    const WeightedPoint whole{corner};
+    Anchor anchor{mean_influences(model, {&whole, 1}), rest_point(model, corner), at.weight[c]};
     for (Index i = 0; i < model.modes(); ++i) anchor.shapes.push_back(shape_at(model, corner, i));
     anchors_.push_back(std::move(anchor));
   }
@@ -112,21 +145,19 @@ MaterialFrame::MaterialFrame(Index body, const ModalModel& model, std::span<cons
                              const JointFrame& in_body, bool skinned)
     : body_(body), rest_(in_body) {
   if (patch.empty()) throw InvalidArgument("MaterialFrame: the patch of \"" + model.name() + "\" has no points");
-  const double weight = 1.0 / static_cast<double>(patch.size());
+  for (const SurfacePoint& at : patch) validate(model, at);
+  const std::vector<WeightedPoint> points = weighted_points(model, patch);
   Vec3 mean = Vec3::Zero();
-  for (const SurfacePoint& at : patch) {
-    validate(model, at);
-    mean += weight * rest_point(model, at);
-  }
+  for (const auto& [at, weight] : points) mean += weight * rest_point(model, at);
   Mat3 inertia = Mat3::Zero();
-  for (const SurfacePoint& at : patch) {
+  for (const auto& [at, weight] : points) {
     const Vec3 x = rest_point(model, at) - mean;
     inertia += weight * (x.squaredNorm() * Mat3::Identity() - x * x.transpose());
   }
   const Mat3 inverse = pseudo_inverse(inertia);
   for (Index i = 0; i < model.modes(); ++i) {
     Vec3 displacement = Vec3::Zero(), moment = Vec3::Zero();
-    for (const SurfacePoint& at : patch) {
+    for (const auto& [at, weight] : points) {
       const Vec3 u = shape_at(model, at, i);
       displacement += weight * u;
       moment += weight * (rest_point(model, at) - mean).cross(u);
@@ -134,7 +165,7 @@ MaterialFrame::MaterialFrame(Index body, const ModalModel& model, std::span<cons
     rotation_.push_back(inverse * moment);
     displacement_.push_back(displacement + rotation_.back().cross(in_body.origin - mean));
   }
-  if (skinned) anchors_.push_back({mean_influences(model, patch), in_body.origin, 1.0, displacement_});
+  if (skinned) anchors_.push_back({mean_influences(model, points), in_body.origin, 1.0, displacement_});
 }
 
 Vec3 MaterialFrame::displace(std::span<const double> z) const { return times(displacement_, z); }

@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "dense_fem.h"
 #include "limber/core/cross_matrix.h"
 #include "limber/machine/machine.h"
+#include "limber/mesh/surface_mesh.h"
 #include "limber/precompute/bake.h"
 #include "tet_box.h"
 
@@ -39,22 +41,37 @@ std::vector<Index> patch_of(const TetMesh& mesh, const Vec3& origin) {
   return patch;
 }
 
-/// What the frame of a joint at `origin` moves and turns by: 6 rows over the nodes' displacements.
+/// What the frame of a joint at `origin` moves and turns by: 6 rows over the nodes' displacements. Means over the area
+/// of the facets between the patch's nodes, of x = Σ φ_i x_i and u = Σ φ_j u_j, by ∫ φ_i φ_j = (1 + δ_ij) A/12.
 Eigen::MatrixXd frame_rows(const TetMesh& mesh, const Vec3& origin) {
   const std::vector<Index> patch = patch_of(mesh, origin);
-  const double w = 1.0 / static_cast<double>(patch.size());
-  Vec3 mean = Vec3::Zero();
-  for (const Index n : patch) mean += w * mesh.nodes[static_cast<std::size_t>(n)];
-  Mat3 inertia = Mat3::Zero();
-  for (const Index n : patch) {
-    const Mat3 x = cross_matrix(mesh.nodes[static_cast<std::size_t>(n)] - mean);
-    inertia -= w * x * x;
+  const auto outside = [&](Index n) { return std::ranges::find(patch, n) == patch.end(); };
+  const auto n = static_cast<Eigen::Index>(mesh.nodes.size());
+  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(n, n);
+  const BoundarySurface boundary = boundary_surface(mesh);
+  for (Triangle t : boundary.surface.triangles) {
+    for (Index& corner : t) corner = boundary.node_of[static_cast<std::size_t>(corner)];
+    if (outside(t[0]) || outside(t[1]) || outside(t[2])) continue;
+    const auto at = [&](int c) { return mesh.nodes[static_cast<std::size_t>(t[static_cast<std::size_t>(c)])]; };
+    const double area = 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
+    for (const Index i : t)
+      for (const Index j : t) products(i, j) += (i == j ? 2.0 : 1.0) * area / 12.0;
   }
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6, static_cast<Eigen::Index>(3 * mesh.nodes.size()));
-  for (const Index n : patch) {
-    const Mat3 turn = w * inertia.inverse() * cross_matrix(mesh.nodes[static_cast<std::size_t>(n)] - mean);
-    rows.block<3, 3>(3, 3 * n) = turn;
-    rows.block<3, 3>(0, 3 * n) = w * Mat3::Identity() - cross_matrix(origin - mean) * turn;
+  products /= products.sum();
+  const Eigen::VectorXd weight = products.rowwise().sum();
+  Vec3 mean = Vec3::Zero();
+  for (const Index i : patch) mean += weight[i] * mesh.nodes[static_cast<std::size_t>(i)];
+  const auto arm = [&](Index i) { return cross_matrix(mesh.nodes[static_cast<std::size_t>(i)] - mean); };
+  Mat3 inertia = Mat3::Zero();
+  for (const Index i : patch)
+    for (const Index j : patch) inertia -= products(i, j) * arm(i) * arm(j);
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6, 3 * n);
+  for (const Index j : patch) {
+    Mat3 moment = Mat3::Zero();
+    for (const Index i : patch) moment += products(i, j) * arm(i);
+    const Mat3 turn = inertia.inverse() * moment;
+    rows.block<3, 3>(3, 3 * j) = turn;
+    rows.block<3, 3>(0, 3 * j) = weight[j] * Mat3::Identity() - cross_matrix(origin - mean) * turn;
   }
   return rows;
 }

@@ -72,7 +72,7 @@ void add_residual_modes(ModalAnalysis& a, const BodyInput& in, const PlacedSurfa
   const auto first = static_cast<Index>(a.eigenvalues.size());
   Eigen::MatrixXd F = node_loads(a.nodes, in.residual_nodes);
   for (const AttachmentPatch& patch : in.patches) {
-    const Eigen::MatrixXd more = patch_loads(in.part.mesh, touching.surface.vertices, touching.embedding, patch);
+    const Eigen::MatrixXd more = patch_loads(in.part.mesh, touching.surface, touching.embedding, patch);
     F.conservativeResize(Eigen::NoChange, F.cols() + more.cols());
     F.rightCols(more.cols()) = more;
   }

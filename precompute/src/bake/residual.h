@@ -17,11 +17,11 @@ namespace limber::internal {
 /// Unit forces at some nodes, one axis at a time: 3n × 3 nodes.
 Eigen::MatrixXd node_loads(Index mesh_nodes, std::span<const Index> nodes);
 
-/// Loads of a patch as a whole: three forces, shared by its vertices alike, and the moments that work with the rotation
+/// Loads of a patch as a whole: three forces, shared by area, and the moments that work with the rotation
 /// which fits the vertices' displacements best (limber/constraints/material_frame.h), over the patch's radius of
 /// gyration: forces too. None about directions in which it has no extent.
-/// @param surface its vertices in mesh coordinates, and where they lie in the tets
-Eigen::MatrixXd patch_loads(const TetMesh& mesh, std::span<const Vec3> vertices, const Embedding& surface,
+/// @param touching in mesh coordinates. @param surface where its vertices lie in the tets
+Eigen::MatrixXd patch_loads(const TetMesh& mesh, const SurfaceMesh& touching, const Embedding& surface,
                             const AttachmentPatch& patch);
 
 /// Modes that joined the analysis, and the kept modes' part of fᵀ K⁺ f without them, with the rest, for each load.

@@ -74,7 +74,8 @@ class MaterialFrame {
   /// One point of the surface; axes of the body frame. @param skinned the body bends by its model's skin, here and
   /// below
   MaterialFrame(Index body, const ModalModel& model, const SurfacePoint& at, bool skinned = false);
-  /// A patch: equal weights for all points. @param in_body where the frame sits in the rest shape
+  /// A patch: of vertices weighted by the area between them, where there is any; else of points alike. @param in_body
+  /// where the frame sits in the rest shape
   /// @throws InvalidArgument if `patch` is empty or a point of it is not valid
   MaterialFrame(Index body, const ModalModel& model, std::span<const SurfacePoint> patch, const JointFrame& in_body,
                 bool skinned = false);

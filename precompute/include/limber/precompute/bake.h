@@ -67,7 +67,7 @@ struct BakeInput {
 };
 
 /// A patch of the collision surface that something is attached to: all vertices within a distance, or the nearest one,
-/// with equal weights, as JointAttachment (limber/engine/world.h) takes them.
+/// weighted by the area between them, as JointAttachment (limber/engine/world.h) takes them.
 struct AttachmentPatch {
   Vec3 center = Vec3::Zero();  ///< m, mesh coordinates
   double radius = 0.0;         ///< m, ≥ 0
