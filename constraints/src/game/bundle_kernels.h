@@ -27,7 +27,6 @@ struct PairBundle {
   std::int32_t blocks[2][kBundleLanes] = {};  // of each lane's modes
   std::int32_t modes[2] = {};                 // the most in any lane, in whole blocks
   std::int32_t rows = 0;                      // of its first contact's modes
-  std::int32_t room = 0;                      // for the modes at hand, where they are many: into BundleArrays::room
   std::int32_t first = 0, count = 0;
   Block8 inverse_turn;    // effective inertia of resistance to rolling, N·m/rad
   bool rolls = false;     // whether any resists rolling
@@ -69,13 +68,14 @@ struct BundleArrays {
   PairBundle* bundles = nullptr;
   BundleContact* contacts = nullptr;
   Block8* rows = nullptr;     // of modes: by contact, side, mode and axis
-  Block8* room = nullptr;     // by bundle with many modes, a block a mode
+  Block8* room = nullptr;     // for the modes of the bundle at hand, a block a mode
+  std::size_t width = 0;      // the most modes of a bundle, of both sides
   std::size_t count = 0;      // of bundles
   std::int32_t zeros = 0;     // the block of coordinates that stands
   std::int32_t standing = 0;  // number of frames: where what stands is found
 
   BundleArrays part(std::size_t begin, std::size_t end) const {
-    return {bundles + begin, contacts, rows, room, end - begin, zeros, standing};
+    return {bundles + begin, contacts, rows, room + begin * width, width, end - begin, zeros, standing};
   }
 };
 

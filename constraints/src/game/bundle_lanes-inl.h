@@ -139,16 +139,10 @@ HWY_INLINE HWY_ATTR void WriteSides(const PairBundle& bundle, const std::int32_t
   }
 }
 
-/// The modes of both bodies, in the lanes that have any: a vector a mode, in the memory of a function or in a bundle's.
-constexpr std::int32_t kModesAtHand = 64;
-struct ModesAtHand {
-  alignas(32) float v[kModesAtHand * kLanesAtOnce];
-};
+/// The modes of both bodies, in the lanes that have any: a vector a mode, in the arrays' room.
 struct Modes {
-  Modes(const BundleArrays& all, const PairBundle& bundle, ModesAtHand& at_hand) {
-    y[0] = bundle.modes[0] + bundle.modes[1] <= kModesAtHand ? at_hand.v : all.room[bundle.room].v;
-    y[1] = y[0] + static_cast<std::size_t>(bundle.modes[0]) * kLanesAtOnce;
-  }
+  Modes(const BundleArrays& all, const PairBundle& bundle)
+      : y{all.room->v, all.room->v + static_cast<std::size_t>(bundle.modes[0]) * kLanesAtOnce} {}
   float* of(std::size_t side, std::int32_t mode) const {
     return y[side] + static_cast<std::size_t>(mode) * kLanesAtOnce;
   }
@@ -184,9 +178,8 @@ HWY_INLINE HWY_ATTR void WriteModes(const PairBundle& bundle, Block8* y, std::si
 
 /// All coordinates of both bodies.
 struct Coordinates {
-  Coordinates(const BundleArrays& all, const PairBundle& bundle) : modes(all, bundle, at_hand) {}
+  Coordinates(const BundleArrays& all, const PairBundle& bundle) : modes(all, bundle) {}
   Sides sides;
-  ModesAtHand at_hand;
   Modes modes;
 };
 

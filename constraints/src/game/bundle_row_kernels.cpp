@@ -95,8 +95,7 @@ HWY_ATTR void MakeBundleRows(const BundleArrays& all, const Block8* shapes) {
   for (std::size_t b = 0; b < all.count; ++b) {
     const PairBundle& bundle = all.bundles[b];
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
-      ModesAtHand at_hand;
-      const Modes modes(all, bundle, at_hand);
+      const Modes modes(all, bundle);
       ReadModes(all, bundle, shapes, lane, modes);
       Vector rate[3];
       for (std::size_t i = 0; i < 3; ++i) {
@@ -177,8 +176,7 @@ HWY_ATTR void MeasureBundles(const BundleArrays& all, const FrameShift* frames, 
     for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
       Vector come[2][12];
       ReadShifts(bundle, frames, &FrameShift::shift, lane, come);
-      ModesAtHand at_hand;
-      const Modes modes(all, bundle, at_hand);
+      const Modes modes(all, bundle);
       ReadModes(all, bundle, shapes, lane, modes);
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         Vector bent[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};

@@ -74,12 +74,12 @@ void PairBundles::pack(const GameBodies& bodies) {
   bundles_.clear();
   lanes_.clear();
   runs_.clear();
-  std::int32_t size = 0, rows = 0, room = 0;
+  std::int32_t size = 0, rows = 0, width = 0;
   for (std::size_t level = 0; level + 1 < begins_.size(); ++level) {
     const std::size_t first = bundles_.size();
     for (std::int32_t begin = begins_[level]; begin < begins_[level + 1]; begin += kBundleLanes) {
       PairBundle& bundle = bundles_.emplace_back();
-      bundle.first = size, bundle.rows = rows, bundle.room = room;
+      bundle.first = size, bundle.rows = rows;
       const std::int32_t end = std::min(begins_[level + 1], begin + static_cast<std::int32_t>(kBundleLanes));
       for (std::size_t lane = 0; lane < kBundleLanes; ++lane) {
         const std::int32_t at = begin + static_cast<std::int32_t>(lane);
@@ -87,13 +87,14 @@ void PairBundles::pack(const GameBodies& bodies) {
       }
       size += bundle.count;
       rows += 3 * bundle.count * (bundle.modes[0] + bundle.modes[1]);
-      room += bundle.modes[0] + bundle.modes[1];
+      width = std::max(width, bundle.modes[0] + bundle.modes[1]);
     }
     add_to_runs(first);
   }
   if (packed_.size() < static_cast<std::size_t>(size)) packed_.resize(static_cast<std::size_t>(size));
   if (rows_.size() < static_cast<std::size_t>(rows)) rows_.resize(static_cast<std::size_t>(rows));
-  if (room_.size() < static_cast<std::size_t>(room)) room_.resize(static_cast<std::size_t>(room));
+  width_ = static_cast<std::size_t>(width);
+  if (const std::size_t room = bundles_.size() * width_ + 1; room_.size() < room) room_.resize(room);
 }
 
 /// The bundles of a level, the last so far.

@@ -103,7 +103,7 @@ class PairBundles {
   };
   static constexpr std::size_t kBundlesAtOnce = 4;  // of one thread
   BundleArrays arrays() {
-    return {bundles_.data(), packed_.data(), rows_.data(), room_.data(), bundles_.size(), zeros_, standing_};
+    return {bundles_.data(), packed_.data(), rows_.data(), room_.data(), width_, bundles_.size(), zeros_, standing_};
   }
   void add_to_runs(std::size_t begin);
   struct Place {
@@ -121,10 +121,11 @@ class PairBundles {
   }
 
   std::int32_t standing_ = 0, zeros_ = 0;
+  std::size_t width_ = 0;  // the most modes of a bundle
   std::vector<PairBundle> bundles_;
   std::vector<BundleContact> packed_;
   std::vector<Block8> rows_;    // of modes
-  std::vector<Block8> room_;    // for the modes at hand
+  std::vector<Block8> room_;    // by bundle, as parts begin at any: its first one's is theirs
   std::vector<Block8> shares_;  // by bundle
   std::vector<Place> places_;   // by contact
   std::vector<Lane> lanes_;     // by bundle
