@@ -34,7 +34,7 @@ struct WeightedPoint {
   double weight = 1.0;
 };
 
-/// What a patch is a mean over: of vertices of one surface the area between them, where there is any; else its points.
+/// What a patch is a mean over: the samples of a patch of vertices of one surface; else its points.
 std::vector<WeightedPoint> weighted_points(const ModalModel& model, std::span<const SurfacePoint> patch) {
   const ModalSurface& s = surface_of(model, patch[0]);
   std::vector<bool> inside(s.rest.size(), false);
@@ -51,7 +51,7 @@ std::vector<WeightedPoint> weighted_points(const ModalModel& model, std::span<co
     for (const auto& [triangle, at, weight] :
          patch_samples(s.triangles, inside, [&](std::size_t v) { return Vec3(s.rest[v].cast<double>()); }))
       points.push_back({{patch[0].surface, triangle, at}, weight});
-  if (points.empty())
+  else
     for (const SurfacePoint& at : patch) points.push_back({at, 1.0 / static_cast<double>(patch.size())});
   return points;
 }

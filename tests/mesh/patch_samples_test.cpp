@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace limber {
 namespace {
 
@@ -27,8 +29,14 @@ TEST(PatchSamples, MeansOfProductsOfLinearFunctionsAreExact) {
   EXPECT_NEAR(xy, 0.5, 1e-15);
 }
 
-TEST(PatchSamples, AreNoneWhereNoTriangleLiesInThePatch) {
-  EXPECT_TRUE(samples_of({true, true, false, false, false}).empty());
+TEST(PatchSamples, AreTheVerticesAlikeWhereNoTriangleLiesInThePatch) {
+  const auto samples = samples_of({true, true, false, false, false});
+  ASSERT_EQ(samples.size(), 2u);
+  for (std::size_t v = 0; v < 2; ++v) {
+    const auto corner = static_cast<std::size_t>(std::ranges::find(samples[v].at, 1.0) - samples[v].at.begin());
+    EXPECT_EQ(kTriangles[static_cast<std::size_t>(samples[v].triangle)][corner], static_cast<Index>(v));
+    EXPECT_EQ(samples[v].weight, 0.5);
+  }
 }
 
 }  // namespace

@@ -2,8 +2,8 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <functional>
 
 #include "limber/core/cross_matrix.h"
 #include "limber/mesh/patch_samples.h"
@@ -101,41 +101,17 @@ Mat3 yielding(const Mat3& block) {
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-/// Vertices with shares that sum to 1: a place, what it weighs among others.
-struct LoadedPoint {
-  std::array<std::size_t, 3> vertex{};
-  std::array<double, 3> share{1.0, 0.0, 0.0};
-  double weight = 1.0;
-
-  Vec3 place(std::span<const Vec3> vertices) const {
-    return share[0] * vertices[vertex[0]] + share[1] * vertices[vertex[1]] + share[2] * vertices[vertex[2]];
+/// What a patch is a mean over; the nearest vertex where none is within.
+std::vector<PatchSample> samples_of(const SurfaceMesh& surface, const AttachmentPatch& patch) {
+  std::vector<bool> inside(surface.vertices.size(), false);
+  std::size_t nearest = 0;
+  const auto distance = [&](std::size_t v) { return (surface.vertices[v] - patch.center).norm(); };
+  for (std::size_t v = 0; v < inside.size(); ++v) {
+    inside[v] = distance(v) <= patch.radius;
+    if (distance(v) < distance(nearest)) nearest = v;
   }
-};
-
-/// What a patch is a mean over: the area between its vertices, or these where there is none; the nearest vertex where
-/// none is within.
-std::vector<LoadedPoint> points_of(const SurfaceMesh& surface, const AttachmentPatch& patch) {
-  const std::span<const Vec3> vertices = surface.vertices;
-  std::vector<bool> inside(vertices.size(), false);
-  std::size_t nearest = 0, count = 0;
-  for (std::size_t v = 0; v < vertices.size(); ++v) {
-    const double distance = (vertices[v] - patch.center).norm();
-    if (distance <= patch.radius) inside[v] = true, ++count;
-    if (distance < (vertices[nearest] - patch.center).norm()) nearest = v;
-  }
-  if (count == 0) return {{.vertex = {nearest, nearest, nearest}}};
-  std::vector<LoadedPoint> points;
-  for (const PatchSample& sample :
-       patch_samples(surface.triangles, inside, [&](std::size_t v) { return vertices[v]; })) {
-    const Triangle& t = surface.triangles[static_cast<std::size_t>(sample.triangle)];
-    points.push_back({{static_cast<std::size_t>(t[0]), static_cast<std::size_t>(t[1]), static_cast<std::size_t>(t[2])},
-                      sample.at,
-                      sample.weight});
-  }
-  if (!points.empty()) return points;
-  for (std::size_t v = 0; v < vertices.size(); ++v)
-    if (inside[v]) points.push_back({.vertex = {v, v, v}, .weight = 1.0 / static_cast<double>(count)});
-  return points;
+  if (std::ranges::none_of(inside, std::identity())) inside[nearest] = true;
+  return patch_samples(surface.triangles, inside, [&](std::size_t v) { return surface.vertices[v]; });
 }
 
 void append(const Eigen::MatrixXd& columns, std::vector<double>& all) {
@@ -154,13 +130,21 @@ Eigen::MatrixXd node_loads(Index mesh_nodes, std::span<const Index> nodes) {
 
 Eigen::MatrixXd patch_loads(const TetMesh& mesh, const SurfaceMesh& touching, const Embedding& surface,
                             const AttachmentPatch& patch) {
-  const std::vector<LoadedPoint> points = points_of(touching, patch);
+  const std::vector<PatchSample> samples = samples_of(touching, patch);
+  const auto vertex = [&](const PatchSample& sample, std::size_t corner) {
+    return static_cast<std::size_t>(touching.triangles[static_cast<std::size_t>(sample.triangle)][corner]);
+  };
+  const auto place = [&](const PatchSample& sample) {
+    Vec3 p = Vec3::Zero();
+    for (std::size_t c = 0; c < 3; ++c) p += sample.at[c] * touching.vertices[vertex(sample, c)];
+    return p;
+  };
   Vec3 mean = Vec3::Zero();
-  for (const LoadedPoint& p : points) mean += p.weight * p.place(touching.vertices);
+  for (const PatchSample& sample : samples) mean += sample.weight * place(sample);
   Mat3 inertia = Mat3::Zero();
-  for (const LoadedPoint& p : points) {
-    const Vec3 x = p.place(touching.vertices) - mean;
-    inertia += p.weight * (x.squaredNorm() * Mat3::Identity() - x * x.transpose());
+  for (const PatchSample& sample : samples) {
+    const Vec3 x = place(sample) - mean;
+    inertia += sample.weight * (x.squaredNorm() * Mat3::Identity() - x * x.transpose());
   }
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(inertia);
   const double largest = eigen.eigenvalues().maxCoeff();
@@ -169,14 +153,14 @@ Eigen::MatrixXd patch_loads(const TetMesh& mesh, const SurfaceMesh& touching, co
     if (eigen.eigenvalues()[i] > kRoundOff * largest) inverse[i] = 1.0 / eigen.eigenvalues()[i];
   const Mat3 turns = std::sqrt(largest) * eigen.eigenvectors() * inverse.asDiagonal();  // about the principal axes
   Eigen::MatrixXd F = Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(mesh.nodes.size()), 6);
-  for (const LoadedPoint& p : points) {
+  for (const PatchSample& sample : samples) {
     // The mean displacement's and rotation's part of this point's displacement, transposed.
     Eigen::Matrix<double, 3, 6> load;
-    load << Mat3::Identity(), cross_matrix(p.place(touching.vertices) - mean).transpose() * turns;
+    load << Mat3::Identity(), cross_matrix(place(sample) - mean).transpose() * turns;
     for (std::size_t corner = 0; corner < 3; ++corner) {
-      const NodeShares at = node_shares(mesh, surface.vertices[p.vertex[corner]]);
+      const NodeShares at = node_shares(mesh, surface.vertices[vertex(sample, corner)]);
       for (std::size_t c = 0; c < at.count; ++c)
-        F.middleRows<3>(3 * at.node[c]) += p.weight * p.share[corner] * at.share[c] * load;
+        F.middleRows<3>(3 * at.node[c]) += sample.weight * sample.at[corner] * at.share[c] * load;
     }
   }
   return F;

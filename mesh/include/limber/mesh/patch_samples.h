@@ -6,6 +6,7 @@
 
 #include <array>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "limber/core/types.h"
@@ -15,18 +16,25 @@ namespace limber {
 struct PatchSample {
   Index triangle = 0;
   std::array<double, 3> at{};  ///< barycentric
-  double weight = 0.0;         ///< share of the area; they sum to 1
+  double weight = 0.0;         ///< share of the whole; they sum to 1
 };
 
-/// Of the triangles that have all corners in the patch; none where those have no area.
+/// Of the triangles that have all corners in the patch; where those have no area, its vertices alike.
 /// @param inside by vertex. @param place where a vertex is, m
 template <class Place>
 std::vector<PatchSample> patch_samples(std::span<const Triangle> triangles, const std::vector<bool>& inside,
-                                       Place&& place) {
-  std::vector<PatchSample> samples;
+                                       const Place& place) {
+  std::vector<PatchSample> samples, vertices;
+  std::vector<bool> left = inside;  // of the vertices
   double area = 0.0;
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const auto corner = [&](std::size_t c) { return static_cast<std::size_t>(triangles[t][c]); };
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (!left[corner(c)]) continue;
+      left[corner(c)] = false;
+      vertices.push_back({.triangle = static_cast<Index>(t), .weight = 1.0});
+      vertices.back().at[c] = 1.0;
+    }
     if (!inside[corner(0)] || !inside[corner(1)] || !inside[corner(2)]) continue;
     const Vec3 a = place(corner(0)), b = place(corner(1)), c = place(corner(2));
     const double of_triangle = 0.5 * (b - a).cross(c - a).norm();
@@ -34,9 +42,10 @@ std::vector<PatchSample> patch_samples(std::span<const Triangle> triangles, cons
     for (const std::array<double, 3>& at : {std::array{0.5, 0.5, 0.0}, {0.0, 0.5, 0.5}, {0.5, 0.0, 0.5}})
       samples.push_back({static_cast<Index>(t), at, of_triangle / 3.0});
   }
-  if (!(area > 0.0)) return {};
-  for (PatchSample& sample : samples) sample.weight /= area;
-  return samples;
+  const double all = area > 0.0 ? area : static_cast<double>(vertices.size());
+  std::vector<PatchSample>& chosen = area > 0.0 ? samples : vertices;
+  for (PatchSample& sample : chosen) sample.weight /= all;
+  return std::move(chosen);
 }
 
 }  // namespace limber
