@@ -93,7 +93,7 @@ Mat3 rotation_by(const Vec3& r) {
 /// (sinc √v − sinc √u)/(u − v), u = ¼(|a| + |b|)², v = ¼(|a| − |b|)²: by its series where turns are small, else by that
 /// of two ways to write it whose denominator is large.
 double sinc_slope(const HalfTurn& a, const HalfTurn& b) {
-  constexpr double kSmall = 16.0;  // what is left out of the series is 1e-18
+  constexpr double kSmall = internal::kConstraintsTuning.rows.series_of_turns;
   const double half = 0.5 * (a.angle + b.angle), across = 0.5 * (a.angle - b.angle), u = half * half,
                v = across * across;
   const auto sinc = [](double x) { return x != 0.0 ? std::sin(x) / x : 1.0; };

@@ -29,6 +29,9 @@ struct RowTuning {
   double least_euler_determinant = 1e-3;
   /// Part of a patch's largest second moment below which a direction tells no rotation. [path]
   double thin_patch = 1e-6;
+  /// ¼(|a| + |b|)² of the rotation vectors of two attitudes, rad², up to which the turn between them is by a series of
+  /// 17 terms: what is left out is 1e-18. [path]
+  double series_of_turns = 16.0;
   /// Cosine of two normals below which contacts that overlap hold a part from both sides. [path] By judgement: 120°.
   double opposed_normals = -0.5;
   /// Part of ContactOptions::compliance left beside a residual compliance, which shares loads by itself.
