@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <thread>
 
 #include "distributed_body.h"
@@ -54,8 +53,6 @@ void declare_options(CLI::App& app, Arguments& a) {
   app.add_option("--of", a.of, "how many slices there are in all")->type_name("N")->check(CLI::Range(1, 1'000'000));
 }
 
-double hz_of(double eigenvalue) { return std::sqrt(eigenvalue) / (2.0 * std::numbers::pi); }
-
 ParallelModes modes_of(DistributedBody& body, const Arguments& a) {
   if (a.estimate) return internal::estimated_factor(body);
   if (a.without_factor) return internal::lowest_modes_without_factor(body, a.modes);
@@ -69,7 +66,7 @@ ParallelModes modes_of(DistributedBody& body, const Arguments& a) {
 SpectrumSlice slice_of(const DistributedBody& body, const ParallelModes& modes, const Arguments& a) {
   const StoredBody& stored = body.stored();
   const double unit = stored.eigenvalue_unit();
-  SpectrumSlice slice{.band = {0.0, hz_of(modes.high * unit)},
+  SpectrumSlice slice{.band = {0.0, internal::hz_of_eigenvalue(modes.high * unit)},
                       .of = a.of,
                       .below_low = modes.below_low,
                       .below_high = modes.below_high,

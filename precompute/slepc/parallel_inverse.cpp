@@ -1,14 +1,8 @@
 #include "parallel_inverse.h"
 
+#include "eigen/refinement.h"
+
 namespace limber::internal {
-namespace {
-
-constexpr int kMaxRefinements = 8;
-constexpr double kRefined = 1e-12;     // a correction this small, relative to the answer, was the last
-constexpr double kContraction = 0.25;  // a correction must be this much smaller than the one before
-
-}  // namespace
-
 ParallelInverse::ParallelInverse(DistributedBody& body)
     : body_(body),
       factor_(body.pinned_stiffness(), body.elimination_order(), ParallelFactor::Keeps::kFactor, body.stages()) {
@@ -37,22 +31,16 @@ Eigen::MatrixXd ParallelInverse::apply(const Eigen::Ref<const Eigen::MatrixXd>& 
 }
 
 Eigen::MatrixXd ParallelInverse::apply_accurately(const Eigen::Ref<const Eigen::MatrixXd>& F) {
-  Eigen::MatrixXd U = apply(F);
   const auto lengths = [&](const Eigen::MatrixXd& X) -> Eigen::ArrayXd {
     return DistributedBody::dot(X.cwiseProduct(body_.mass_times(X)), Eigen::MatrixXd::Ones(X.rows(), 1)).cwiseSqrt();
   };
-  double change_before = 1.0;
-  for (int step = 0; step < kMaxRefinements; ++step) {
-    Eigen::MatrixXd residual = balanced(F) - body_.stiffness_times(U);
-    if (shift_ != 0.0) residual -= shift_ * body_.mass_times(U);
-    const Eigen::MatrixXd correction = apply(residual);
-    const double change = (lengths(correction) / lengths(U)).maxCoeff();
-    if (change > kContraction * change_before) break;  // no longer improves
-    U += correction;
-    if (change < kRefined) break;
-    change_before = change;
-  }
-  return U;
+  const auto residual = [&](const Eigen::MatrixXd& U) {
+    Eigen::MatrixXd left = balanced(F) - body_.stiffness_times(U);
+    if (shift_ != 0.0) left -= shift_ * body_.mass_times(U);
+    return left;
+  };
+  return refined_answer(
+      F, [&](const auto& X) { return apply(X); }, residual, lengths);
 }
 
 }  // namespace limber::internal

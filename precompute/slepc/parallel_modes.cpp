@@ -100,6 +100,22 @@ Eigen::MatrixXd vectors_of(EPS eps, const DistributedBody& body, Eigen::Index co
   return X;
 }
 
+struct Transformation {
+  ST st = nullptr;
+  PC pc = nullptr;  // applied once a step
+};
+
+Transformation transformation_of(EPS eps, STType type) {
+  Transformation of;
+  KSP ksp = nullptr;
+  check(EPSGetST(eps, &of.st));
+  check(STSetType(of.st, type));
+  check(STGetKSP(of.st, &ksp));
+  check(KSPSetType(ksp, KSPPREONLY));
+  check(KSPGetPC(ksp, &of.pc));
+  return of;
+}
+
 /// The `count` modes nearest to −s that are orthogonal to those found.
 Eigen::MatrixXd krylov_schur(ParallelInverse& inverse, const Eigen::MatrixXd& found, Eigen::Index count,
                              Eigen::Index subspace, std::uint64_t seed) {
@@ -115,15 +131,8 @@ Eigen::MatrixXd krylov_schur(ParallelInverse& inverse, const Eigen::MatrixXd& fo
   check(EPSSetPurify(eps, PETSC_FALSE));
   check(EPSSetDimensions(eps, static_cast<PetscInt>(count), static_cast<PetscInt>(subspace), PETSC_DEFAULT));
   check(EPSSetTolerances(eps, kTolerance, kMostRestarts));
-  ST st = nullptr;
-  KSP ksp = nullptr;
-  PC pc = nullptr;
-  check(EPSGetST(eps, &st));
-  check(STSetType(st, STSINVERT));
+  const auto [st, pc] = transformation_of(eps, STSINVERT);
   check(STSetMatMode(st, ST_MATMODE_SHELL));
-  check(STGetKSP(st, &ksp));
-  check(KSPSetType(ksp, KSPPREONLY));
-  check(KSPGetPC(ksp, &pc));
   check(PCSetType(pc, PCSHELL));
   check(PCShellSetContext(pc, &inverse));
   check(PCShellSetApply(pc, apply_inverse));
@@ -132,7 +141,6 @@ Eigen::MatrixXd krylov_schur(ParallelInverse& inverse, const Eigen::MatrixXd& fo
   Vec start_raw = start;
   check(EPSSetInitialSpace(eps, 1, &start_raw));
   check(EPSSolve(eps));
-
   return vectors_of(eps, body, count);
 }
 
@@ -152,15 +160,8 @@ Eigen::MatrixXd lobpcg(DistributedBody& body, Eigen::Index count) {
   check(EPSSetDimensions(eps, static_cast<PetscInt>(count), PETSC_DEFAULT, PETSC_DEFAULT));
   check(EPSSetTolerances(eps, kTolerance, kMostRestarts));
   deflate(eps, body.N(), body.size());
-  ST st = nullptr;
-  KSP ksp = nullptr;
-  PC pc = nullptr;
-  check(EPSGetST(eps, &st));
-  check(STSetType(st, STPRECOND));
+  const auto [st, pc] = transformation_of(eps, STPRECOND);
   check(STSetPreconditionerMat(st, pinned));
-  check(STGetKSP(st, &ksp));
-  check(KSPSetType(ksp, KSPPREONLY));
-  check(KSPGetPC(ksp, &pc));
   check(PCSetType(pc, PCGAMG));
   check(EPSSolve(eps));
   return vectors_of(eps, body, count);

@@ -4,12 +4,12 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "bake/body_surfaces.h"
 #include "bake/modal_blocks.h"
 #include "bake/residual.h"
 #include "bake/sound.h"
+#include "eigen/hertz.h"
 #include "fem/frequency_error.h"
 #include "fem/locking.h"
 #include "fem/mass_properties.h"
@@ -40,7 +40,7 @@ std::vector<Index> choose_modes(const ModalAnalysis& a, const TetMesh& mesh, con
                          .decay = decay_of(options.damping, lambda),
                          .max_observable = shown,
                          .max_loadable = std::max(shown, touched)});
-    report.modes.frequencies_hz.push_back(std::sqrt(lambda) / (2.0 * std::numbers::pi));
+    report.modes.frequencies_hz.push_back(internal::hz_of_eigenvalue(lambda));
   }
   report.modes.selection = select_modes(strengths, options.limits);
   std::vector<Index> columns;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "bake/modal_blocks.h"
@@ -13,8 +12,6 @@
 
 namespace limber::internal {
 namespace {
-
-using std::numbers::pi;
 
 /// η per region of the mesh; empty where a region of the body has none, so that Rayleigh damping counts.
 std::vector<double> losses_of(const TetMesh& mesh, std::span<const Material> materials, const SoundOptions& options) {
@@ -73,8 +70,8 @@ void fill_report_of_sound(const SoundModes& sound, SoundReport& report) {
   report.modes = sound.modes();
   report.bytes = sizeof(float) * sound.shapes.size();
   if (sound.modes() == 0) return;
-  report.lowest_hz = std::sqrt(sound.eigenvalues.front()) / (2.0 * pi);
-  report.highest_hz = std::sqrt(sound.eigenvalues.back()) / (2.0 * pi);
+  report.lowest_hz = hz_of_eigenvalue(sound.eigenvalues.front());
+  report.highest_hz = hz_of_eigenvalue(sound.eigenvalues.back());
   report.lowest_loss = kUnbounded;
   for (std::size_t k = 0; k < sound.eigenvalues.size(); ++k) {
     const double loss = 2.0 * sound.decays[k] / std::sqrt(sound.eigenvalues[k]);

@@ -4,15 +4,12 @@
 #include <algorithm>
 #include <numeric>
 
+#include "eigen/refinement.h"
 #include "eigen/sparse_operations.h"
 #include "limber/core/error.h"
 
 namespace limber::internal {
 namespace {
-
-constexpr int kMaxRefinements = 8;
-constexpr double kRefined = 1e-12;     // a correction this small, relative to the answer, was the last
-constexpr double kContraction = 0.25;  // a correction must be this much smaller than the one before
 
 std::vector<Index> all_but(Index size, const std::vector<Index>& left_out) {
   std::vector<Index> all(size), kept;
@@ -95,22 +92,16 @@ Eigen::MatrixXd SpectralInverse::apply(const Eigen::Ref<const Eigen::MatrixXd>& 
 
 Eigen::MatrixXd SpectralInverse::apply_accurately(const Eigen::Ref<const Eigen::MatrixXd>& F) {
   const Eigen::MatrixXd& MN = problem_.MN;
-  Eigen::MatrixXd U = apply(F);
   const auto lengths = [&](const Eigen::MatrixXd& X) -> Eigen::ArrayXd {
     return X.cwiseProduct(problem_.mass_times(X)).colwise().sum().cwiseSqrt().transpose();
   };
-  double change_before = 1.0;
-  for (int step = 0; step < kMaxRefinements; ++step) {
-    Eigen::MatrixXd residual = F - MN * (problem_.N.transpose() * F) - problem_.stiffness_times(U);
-    if (shift_ != 0.0) residual -= shift_ * problem_.mass_times(U);
-    const Eigen::MatrixXd correction = apply(residual);
-    const double change = (lengths(correction) / lengths(U)).maxCoeff();
-    if (change > kContraction * change_before) break;  // no longer improves
-    U += correction;
-    if (change < kRefined) break;
-    change_before = change;
-  }
-  return U;
+  const auto residual = [&](const Eigen::MatrixXd& U) {
+    Eigen::MatrixXd left = F - MN * (problem_.N.transpose() * F) - problem_.stiffness_times(U);
+    if (shift_ != 0.0) left -= shift_ * problem_.mass_times(U);
+    return left;
+  };
+  return refined_answer(
+      F, [&](const auto& X) { return apply(X); }, residual, lengths);
 }
 
 }  // namespace limber::internal
