@@ -182,5 +182,39 @@ TEST(MachineOfLinks, BendsAsTheWholeModelDoes) {
       << "without the modes of its joints it is too stiff, or this shows nothing";
 }
 
+/// Three links on a hinge that a motor turns stand out as a rod does, whose end is longer by tan(k)/k − 1, k² = ρ ω²
+/// L²/E. By the joints' forces alone: within a part the modes do not feel the turning.
+TEST(MachineOfLinks, StandsOutWhereItTurns) {
+  constexpr int kLinks = 3;
+  constexpr double kSpeed = 6.0, kReach = kLinks * kLength;
+  const double ends = 0.75 * kWidth;
+  const auto model = baked_link(link_at(0.0), "rubber", kLinkRubber, {{{0, 0, 0}, ends}, {{kLength, 0, 0}, ends}});
+  const Vec3 middle = model->data().origin_in_input;
+  World world({.step = 0.005, .gravity = Vec3::Zero()});
+  world.set_contact_source(nullptr, {.solver = ContactSolver::kExact});
+  JointSpec spec{.type = JointType::kRevolute};
+  spec.frame.axes << Vec3::UnitZ(), Vec3::UnitX(), Vec3::UnitY();
+  BodyId last{};
+  JointId hinge{};
+  for (int i = 0; i < kLinks; ++i) {
+    const Vec3 start(i * kLength, 0.0, 0.0), origin = start + middle, turning(0.0, 0.0, kSpeed);
+    const BodyId next =
+        world.add_body(model, {.pose = {{}, origin}, .velocity = turning.cross(origin), .angular_velocity = turning});
+    spec.frame.origin = start;
+    const JointId joint = world.add_joint(last, next, spec, {.radius = ends}, {.radius = ends});
+    if (i == 0) hinge = joint;
+    last = next, spec = {};
+  }
+  world.set_joint_actuation(hinge, 0, {.motor_velocity = kSpeed, .motor_max_force = 1e6});
+  for (int step = 0; step < 120; ++step) {
+    world.step();
+    EXPECT_TRUE(world.constraint_report().solved) << step;
+  }
+  const SurfacePoint tip = *world.nearest_point(world.body(last).pose * Vec3(kLength, 0.0, 0.0), 1.0)->at;
+  const double k = kSpeed * kReach * std::sqrt(kLinkRubber.density / kLinkRubber.youngs_modulus),
+               law = std::tan(k) / k - 1.0;
+  EXPECT_NEAR((world.position(last, tip).norm() / kReach - 1.0) / law, 1.0, 0.1);
+}
+
 }  // namespace
 }  // namespace limber
