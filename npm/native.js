@@ -1,36 +1,20 @@
 // The WebAssembly behind the classes of limber.js: calls of C functions with objects, arrays and texts of the script's.
 import instantiate from './limber_wasm.js';
+import { compile, LimberError, start } from './source.js';
 
-/** What limber throws; the message is the library's line. */
-export class LimberError extends Error {
-  constructor(result, line) {
-    super(line);
-    this.name = 'LimberError';
-    this.result = result;
-  }
-}
+export { LimberError };
 
 let wasm, loading, structs, defaults;
 const bad = (line) => new LimberError(1, line);
 
 /** Loads the WebAssembly, once. @param source of limber.wasm: bytes, a Response, a URL, a WebAssembly.Module, or a promise of one */
 export function load(source = new URL('./limber.wasm', import.meta.url)) {
-  return loading ??= start(source).catch((error) => { loading = undefined; throw error; });
+  return loading ??= begin(source).catch((error) => { loading = undefined; throw error; });
 }
 export const isLoaded = () => wasm !== undefined;
 
-async function start(source) {
-  let code = await source;
-  if (typeof code === 'string' || code instanceof URL) code = await fetch(code);
-  if (typeof Response !== 'undefined' && code instanceof Response) {
-    if (!code.ok) throw bad(`${code.url}: ${code.status}, expected limber.wasm: give load() its URL or bytes`);
-    code = await code.arrayBuffer();
-  }
-  const module = code instanceof WebAssembly.Module ? code : await WebAssembly.compile(code);
-  wasm = await new Promise((done, fail) => {
-    const instantiateWasm = (imports, ready) => { WebAssembly.instantiate(module, imports).then(ready).catch(fail); return {}; };
-    instantiate({ instantiateWasm }).then(done, fail);
-  });
+async function begin(source) {
+  wasm = await start(instantiate, await compile(source, 'limber.wasm'));
 }
 
 function loaded() {

@@ -1,5 +1,5 @@
 // node check_in_browser.mjs FOLDER EXAMPLE: the package, installed in FOLDER, in headless Chromium: by a plain <script type="module">
-// and from a bundle. Its scenes end in the bits of Node, and a body of the example in the folder EXAMPLE is dragged.
+// and from a bundle. Its scenes and a pose end in the bits of Node, and a body of the example in the folder EXAMPLE is dragged.
 import { readFile } from 'node:fs/promises';
 import { createServer } from 'node:http';
 import { join } from 'node:path';
@@ -21,6 +21,8 @@ const { outputFiles } = await esbuild.build({
 const made = {
   '/plain.html': `<!doctype html><script type="module">import * as limber from './node_modules/limber/limber.js';
     import { scenes } from './scenes.mjs'; await limber.load(); ${play}</script>`,
+  '/posing.html': `<!doctype html><script type="module">import * as posing from './node_modules/limber/posing.js';
+    import { pull } from './pull.mjs'; document.title = JSON.stringify(await pull(posing));</script>`,
   '/bundled.html': '<!doctype html><script type="module" src="bundle/stdin.js"></script>',
   '/favicon.ico': '',
   ...Object.fromEntries(outputFiles.map(({ path, contents }) => [path, contents])),
@@ -40,13 +42,14 @@ async function open(name) {
 }
 
 await run('check_in_browser', folder, async () => {
-  const [limber, { scenes }] = await Promise.all(['node_modules/limber/node.js', 'scenes.mjs'].map((path) => import(pathToFileURL(join(folder, path)).href)));
+  const [limber, { scenes }, posing, { pull }] = await Promise.all(['node_modules/limber/node.js', 'scenes.mjs', 'node_modules/limber/posing_node.js', 'pull.mjs']
+    .map((path) => import(pathToFileURL(join(folder, path)).href)));
   await limber.load();
   const expected = JSON.stringify(scenes(limber));
-  for (const name of ['plain', 'bundled']) {
+  for (const [name, end] of [['plain', expected], ['bundled', expected], ['posing', JSON.stringify(await pull(posing))]]) {
     const page = await open(name);
     await until(async () => wrong.length > 0 || (await page.title()) !== '');
-    check((await page.title()) === expected, `${name}: the scenes end as in Node: ${await page.title()}, ${expected}`);
+    check((await page.title()) === end, `${name} ends as in Node: ${await page.title()}, ${end}`);
   }
 
   const page = await open('index'), highest = () => page.evaluate(() => {
