@@ -65,44 +65,28 @@ void GameConstraints::solve(GameBodies& bodies) {
 /// The forces with which the rows that hold are met, within their bounds. Only what is found last acts on the motion,
 /// whose single precision would lose what rounds find whose rows contradict.
 void GameConstraints::solve_once() {
-  const std::span<const GameGroup> groups = rows_.groups();
-  const bool bound =
-      rows_.any_bounded() && std::ranges::any_of(rows_.rows(), [](const GameRow& r) { return r.hold != Hold::kMet; });
+  const std::span<GameRow> rows = rows_.rows();
   moved_.assign(rows_.coordinates(), 0.0);
-  for (std::size_t g = 0; bound && g < groups.size(); ++g) {
-    forces_.clear();
-    for (const GameRow& row : rows_.of(groups[g])) forces_.push_back(row.hold == Hold::kMet ? 0.0 : row.force);
-    rows_.add_transposed(groups[g], forces_.data(), moved_);
+  forces_.assign(rows.size(), 0.0);
+  if (rows_.any_bounded() && std::ranges::any_of(rows, [](const GameRow& r) { return r.hold != Hold::kMet; })) {
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      if (rows[i].hold != Hold::kMet) forces_[i] = rows[i].force;
+    rows_.add_transposed(forces_, moved_);
+    rows_.multiply(moved_, forces_);
   }
+  rows_.multiply(motion_, products_);
   right_.resize(system_.size());
   asked_.resize(system_.size());
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const std::span<const GameRow> rows = rows_.of(groups[g]);
-    products_.resize(2 * rows.size());
-    rows_.multiply(groups[g], motion_, products_.data());
-    if (bound)
-      rows_.multiply(groups[g], moved_, products_.data() + rows.size());
-    else
-      std::fill_n(products_.data() + rows.size(), rows.size(), 0.0);
-    double *right = right_.data() + system_.first(g), *guess = asked_.data() + system_.first(g);
-    for (const std::int32_t at : system_.met(g)) {
-      const auto i = static_cast<std::size_t>(at);
-      *right++ = rows[i].target - products_[i] - products_[rows.size() + i];
-      *guess++ = rows[i].force;
-    }
-  }
+  system_.for_met(rows_, [&](std::size_t i, std::size_t k) {
+    right_[k] = rows[i].target - products_[i] - forces_[i];
+    asked_[k] = rows[i].force;
+  });
   system_.solve_fully(rows_, asked_, right_);
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const std::span<GameRow> rows = rows_.of(groups[g]);
-    const double* right = right_.data() + system_.first(g);
-    forces_.assign(rows.size(), 0.0);
-    for (const std::int32_t at : system_.met(g)) {
-      const auto i = static_cast<std::size_t>(at);
-      forces_[i] = rows[i].force = rows[i].is_bounded() ? cut_off(rows[i], *right) : *right;
-      ++right;
-    }
-    rows_.add_transposed(groups[g], forces_.data(), moved_);
-  }
+  forces_.assign(rows.size(), 0.0);
+  system_.for_met(rows_, [&](std::size_t i, std::size_t k) {
+    forces_[i] = rows[i].force = rows[i].is_bounded() ? cut_off(rows[i], right_[k]) : right_[k];
+  });
+  rows_.add_transposed(forces_, moved_);
 }
 
 /// Rows whose forces were cut off stay at that bound, and those at a bound that would go beyond their gaps may take
@@ -110,26 +94,20 @@ void GameConstraints::solve_once() {
 bool GameConstraints::let_go(bool takes_hold) {
   if (!rows_.any_bounded()) return false;
   bool changed = false;
-  for (const GameGroup& group : rows_.groups()) {
-    const std::span<GameRow> rows = rows_.of(group);
-    if (std::ranges::none_of(rows, [](const GameRow& row) { return row.is_bounded(); })) continue;
-    products_.resize(2 * rows.size());
-    rows_.multiply(group, motion_, products_.data());
-    rows_.multiply(group, moved_, products_.data() + rows.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      GameRow& row = rows[i];
-      if (!row.is_bounded()) continue;
-      const Hold before = row.hold;
-      if (row.hold == Hold::kMet) {
-        if (!row.cut) continue;
-        row.hold = row.force == row.lower ? Hold::kLower : Hold::kUpper;
-      } else if (takes_hold) {
-        const double open = row.target - products_[i] - products_[rows.size() + i] - row.compliance * row.force,
-                     rounded = kRounded * rows_.length();
-        if (row.hold == Hold::kLower ? open > rounded : open < -rounded) row.hold = Hold::kMet;
-      }
-      changed = changed || row.hold != before;
+  rows_.multiply(moved_, forces_);
+  for (std::size_t i = 0; i < forces_.size(); ++i) {
+    GameRow& row = rows_.rows()[i];
+    if (!row.is_bounded()) continue;
+    const Hold before = row.hold;
+    if (row.hold == Hold::kMet) {
+      if (!row.cut) continue;
+      row.hold = row.force == row.lower ? Hold::kLower : Hold::kUpper;
+    } else if (takes_hold) {
+      const double open = row.target - products_[i] - forces_[i] - row.compliance * row.force,
+                   rounded = kRounded * rows_.length();
+      if (row.hold == Hold::kLower ? open > rounded : open < -rounded) row.hold = Hold::kMet;
     }
+    changed = changed || row.hold != before;
   }
   return changed;
 }
@@ -168,41 +146,33 @@ void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool p
   if (!slopes_.empty()) rows_.add_energy_slopes(bodies, system_.bodies(), bodies.motion(), speed_, slopes_);
 }
 
-/// Right-hand sides of zeros, and the gaps as they are now.
-/// @param visit (group, rows of it that hold, right) with right of kColumns numbers for each of them
-template <class Visit>
-void GameConstraints::for_met_gaps(const BodyStates& states, const Visit& visit) {
-  const std::span<const GameGroup> groups = rows_.groups();
-  right_.assign(kColumns * system_.size(), 0.0);
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    gaps_.resize(groups[g].count);
-    groups[g].constraint->gaps(states, StepTime::kStart, gaps_);
-    visit(groups[g], system_.met(g), right_.data() + kColumns * system_.first(g));
-  }
+/// As they are now.
+void GameConstraints::find_gaps(const BodyStates& states) {
+  gaps_.resize(rows_.rows().size());
+  for (const GameGroup& group : rows_.groups())
+    group.constraint->gaps(states, StepTime::kStart, std::span(gaps_).subspan(group.first, group.count));
 }
 
 /// What the rows that hold are short of: in their rates, by the way they turned, and in places.
 void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies, bool pushed) {
   const double most = kTuning.recovery_speed * rows_.length();
   rows_.scale(system_.bodies(), bodies.motion(), motion_);
-  if (pushed) rows_.scale_pushes(system_.bodies(), bodies.pushes(), pushes_);
-  for_met_gaps(states, [&](const GameGroup& group, std::span<const std::int32_t> met, double* right) {
-    const std::span<const GameRow> rows = rows_.of(group);
-    products_.assign(2 * rows.size(), 0.0);
-    rows_.multiply(group, motion_, products_.data());
-    if (pushed) rows_.multiply(group, pushes_, products_.data() + rows.size());
-    for (const std::int32_t at : met) {
-      const auto i = static_cast<std::size_t>(at);
-      const GameRow& row = rows[i];
-      right[kRate] = row.target - products_[i] - row.compliance * row.force;
-      if (row.keeps_place) {
-        const double place = row.error + products_[rows.size() + i],
-                     straight = place - right[kRate];  // the gap as the rows foretell it
-        right[kCurve] = straight - (gaps_[i] - row.rate);
-        right[kPlace] = -std::clamp(place, -most, most);
-      }
-      right += kColumns;
-    }
+  rows_.multiply(motion_, products_);
+  forces_.assign(rows_.rows().size(), 0.0);
+  if (pushed) {
+    rows_.scale_pushes(system_.bodies(), bodies.pushes(), pushes_);
+    rows_.multiply(pushes_, forces_);
+  }
+  find_gaps(states);
+  right_.assign(kColumns * system_.size(), 0.0);
+  system_.for_met(rows_, [&](std::size_t i, std::size_t k) {
+    const GameRow& row = rows_.rows()[i];
+    double* right = right_.data() + kColumns * k;
+    right[kRate] = row.target - products_[i] - row.compliance * row.force;
+    if (!row.keeps_place) return;
+    const double place = row.error + forces_[i], straight = place - right[kRate];  // the gap as the rows foretell it
+    right[kCurve] = straight - (gaps_[i] - row.rate);
+    right[kPlace] = -std::clamp(place, -most, most);
   });
 }
 
@@ -225,23 +195,23 @@ void GameConstraints::displace(GameBodies& bodies) {
   const std::span<const GameGroup> groups = rows_.groups();
   speed_.assign(rows_.coordinates(), 0.0);
   place_.assign(rows_.coordinates(), 0.0);
+  forces_.assign(rows_.rows().size(), 0.0);
+  products_.assign(rows_.rows().size(), 0.0);
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    const std::span<GameRow> rows = rows_.of(groups[g]);
     const double share = given_[system_.component(g)];
     const double* found = right_.data() + kColumns * system_.first(g);
-    forces_.assign(2 * rows.size(), 0.0);
-    double *forces = forces_.data(), *yields = forces + rows.size();
     for (const std::int32_t at : system_.met(g)) {
-      GameRow& row = rows[static_cast<std::size_t>(at)];
+      const std::size_t i = groups[g].first + static_cast<std::size_t>(at);
+      GameRow& row = rows_.rows()[i];
       const double force = std::clamp(row.force + found[kRate] + share * found[kCurve], row.lower, row.upper);
-      forces[at] = force - row.force;
+      forces_[i] = force - row.force;
       row.force = force;
-      yields[at] = found[kPlace] + (1.0 - share) * found[kCurve];
+      products_[i] = found[kPlace] + (1.0 - share) * found[kCurve];
       found += kColumns;
     }
-    rows_.add_transposed(groups[g], forces, speed_);
-    rows_.add_transposed(groups[g], yields, place_);
   }
+  rows_.add_transposed(forces_, speed_);
+  rows_.add_transposed(products_, place_);
   move(bodies);
 }
 
@@ -255,22 +225,17 @@ void GameConstraints::move(GameBodies& bodies) {
   }
 }
 
-/// Of a group's impulses: energies are squares, so each force takes the mean of the slopes before and after.
-double GameConstraints::work_of(const GameGroup& group) {
-  products_.resize(group.count);
-  rows_.multiply(group, slopes_, products_.data());
-  double work = 0.0;
-  for (std::size_t i = 0; i < group.count; ++i) work += 0.5 * rows_.of(group)[i].force * products_[i];
-  return work;
-}
-
 void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, bool last) {
+  if (!slopes_.empty()) rows_.multiply(slopes_, products_);
   for (const GameGroup& group : rows_.groups()) {
     const std::span<const GameRow> rows = rows_.of(group);
     forces_.resize(rows.size());
     for (std::size_t i = 0; i < rows.size(); ++i) forces_[i] = rows_.length() * rows[i].force;
     group.constraint->accept(states, forces_);
-    if (group.constraint->counts_work()) group.constraint->accept_work(work_of(group));
+    if (!group.constraint->counts_work()) continue;
+    double work = 0.0;  // energies are squares, so each force takes the mean of the slopes before and after
+    for (std::size_t i = 0; i < rows.size(); ++i) work += 0.5 * rows[i].force * products_[group.first + i];
+    group.constraint->accept_work(work);
   }
   if (last && !rows_.groups().empty()) close_step(states, bodies);
 }
@@ -327,47 +292,32 @@ void GameConstraints::shorten_closing(GameBodies& bodies) {
 /// Limits hold where they are passed.
 void GameConstraints::find_errors(const BodyStates& states) {
   residual_ = 0.0;
-  for (const GameGroup& group : rows_.groups()) {
-    gaps_.resize(group.count);
-    group.constraint->gaps(states, StepTime::kStart, gaps_);
-    const std::span<GameRow> rows = rows_.of(group);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      GameRow& row = rows[i];
-      if (!row.keeps_place) continue;
-      row.error_before = std::exchange(row.error, gaps_[i] - row.left);
-      if (row.is_bounded()) {
-        const bool from_below = row.lower == 0.0, passed = from_below ? row.error < 0.0 : row.error > 0.0;
-        row.hold = passed ? Hold::kMet : from_below ? Hold::kLower : Hold::kUpper;
-      }
-      if (row.hold == Hold::kMet) residual_ = std::max(residual_, std::abs(row.error));
+  find_gaps(states);
+  for (std::size_t i = 0; i < gaps_.size(); ++i) {
+    GameRow& row = rows_.rows()[i];
+    if (!row.keeps_place) continue;
+    row.error_before = std::exchange(row.error, gaps_[i] - row.left);
+    if (row.is_bounded()) {
+      const bool from_below = row.lower == 0.0, passed = from_below ? row.error < 0.0 : row.error > 0.0;
+      row.hold = passed ? Hold::kMet : from_below ? Hold::kLower : Hold::kUpper;
     }
+    if (row.hold == Hold::kMet) residual_ = std::max(residual_, std::abs(row.error));
   }
 }
 
 void GameConstraints::close_errors(GameBodies& bodies) {
-  const std::span<const GameGroup> groups = rows_.groups();
-  right_.assign(system_.size(), 0.0);
+  right_.resize(system_.size());
   asked_.assign(system_.size(), 0.0);
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    double* right = right_.data() + system_.first(g);
-    for (const std::int32_t i : system_.met(g)) {
-      const GameRow& row = rows_.of(groups[g])[static_cast<std::size_t>(i)];
-      *right++ = row.keeps_place ? -row.error : 0.0;
-    }
-  }
+  system_.for_met(rows_, [&](std::size_t i, std::size_t k) {
+    const GameRow& row = rows_.rows()[i];
+    right_[k] = row.keeps_place ? -row.error : 0.0;
+  });
   system_.solve_fully(rows_, asked_, right_);
   speed_.assign(rows_.coordinates(), 0.0);
   place_.assign(rows_.coordinates(), 0.0);
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const std::span<GameRow> rows = rows_.of(groups[g]);
-    const double* found = right_.data() + system_.first(g);
-    forces_.assign(rows.size(), 0.0);
-    for (const std::int32_t at : system_.met(g)) {
-      const auto i = static_cast<std::size_t>(at);
-      forces_[i] = rows[i].closing = *found++;
-    }
-    rows_.add_transposed(groups[g], forces_.data(), place_);
-  }
+  forces_.assign(rows_.rows().size(), 0.0);
+  system_.for_met(rows_, [&](std::size_t i, std::size_t k) { forces_[i] = rows_.rows()[i].closing = right_[k]; });
+  rows_.add_transposed(forces_, place_);
   move(bodies);
 }
 

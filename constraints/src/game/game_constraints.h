@@ -41,13 +41,11 @@ class GameConstraints {
   void solve_once();
   bool let_go(bool takes_hold);
   void take(std::vector<Block8>& motion);
-  template <class Visit>
-  void for_met_gaps(const BodyStates& states, const Visit& visit);
+  void find_gaps(const BodyStates& states);
   void measure(const BodyStates& states, const GameBodies& bodies, bool pushed);
   void find_shares();
   void displace(GameBodies& bodies);
   void move(GameBodies& bodies);
-  double work_of(const GameGroup& group);
   void close_step(const BodyStates& states, GameBodies& bodies);
   void find_errors(const BodyStates& states);
   void close_errors(GameBodies& bodies);
@@ -61,7 +59,7 @@ class GameConstraints {
   std::vector<double> taken_, given_;             // energies by component
   std::vector<double> right_, asked_;             // of the system
   std::vector<double> speed_, place_, pushes_;    // in the rows' coordinates
-  std::vector<double> gaps_, forces_, products_;  // of a group: scratch
+  std::vector<double> gaps_, forces_, products_;  // by row: scratch; products_ keeps J motion_ of a solution
   std::vector<Closing> closings_;                 // by component
   double residual_ = 0.0;
 };

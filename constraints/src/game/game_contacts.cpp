@@ -190,6 +190,7 @@ bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& ste
 // A share s of the forces f changes the energy of bodies and springs by s a + ½ s² b less what springs held,
 // a = f·(c₀ + J y₀), b = f·(J E Jᵀ + C) f.
 void GameContacts::limit_forces(GameBodies& bodies, std::span<const double> moved, Jobs& jobs) {
+  if (size() == 0) return;
   bodies.find_answers(moved, jobs);
   works_.assign(bodies.bodies().size() + 1, {});
   add_works(bodies);

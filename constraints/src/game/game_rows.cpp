@@ -252,28 +252,30 @@ void GameRows::scale_pushes(std::span<const RowBody> at, const std::vector<Block
   }
 }
 
-void GameRows::multiply(const GameGroup& group, std::span<const double> x, double* product) const {
-  for (std::size_t i = 0; i < group.count; ++i) product[i] = 0.0;
-  for (const GameSide& side : group.sides) {
-    if (side.frame < 0) continue;
-    const double *row = numbers(side, 0), *from = x.data() + 8 * side.body;
-    for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates) {
-      double sum = block<6>(row).dot(block<6>(from));
-      for (std::int32_t k = 8; k < side.coordinates; k += 8) sum += block<8>(row + k).dot(block<8>(from + k));
-      product[i] += sum;
+void GameRows::multiply(std::span<const double> x, std::vector<double>& product) const {
+  product.assign(rows_.size(), 0.0);
+  for (const GameGroup& group : groups_)
+    for (const GameSide& side : group.sides) {
+      if (side.frame < 0) continue;
+      const double *row = numbers(side, 0), *from = x.data() + 8 * side.body;
+      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates) {
+        double sum = block<6>(row).dot(block<6>(from));
+        for (std::int32_t k = 8; k < side.coordinates; k += 8) sum += block<8>(row + k).dot(block<8>(from + k));
+        product[group.first + i] += sum;
+      }
     }
-  }
 }
 
-void GameRows::add_transposed(const GameGroup& group, const double* forces, std::span<double> x) const {
-  for (const GameSide& side : group.sides) {
-    if (side.frame < 0) continue;
-    const double* row = numbers(side, 0);
-    double* to = x.data() + 8 * side.body;
-    add_rows<6>(row, side.coordinates, forces, group.count, to);
-    for (std::int32_t k = 8; k < side.coordinates; k += 8)
-      add_rows<8>(row + k, side.coordinates, forces, group.count, to + k);
-  }
+void GameRows::add_transposed(std::span<const double> forces, std::span<double> x) const {
+  for (const GameGroup& group : groups_)
+    for (const GameSide& side : group.sides) {
+      if (side.frame < 0) continue;
+      const double *row = numbers(side, 0), *force = forces.data() + group.first;
+      double* to = x.data() + 8 * side.body;
+      add_rows<6>(row, side.coordinates, force, group.count, to);
+      for (std::int32_t k = 8; k < side.coordinates; k += 8)
+        add_rows<8>(row + k, side.coordinates, force, group.count, to + k);
+    }
 }
 
 }  // namespace limber::internal

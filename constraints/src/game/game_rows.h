@@ -88,10 +88,10 @@ class GameRows {
   void unscale(const RowBody& body, double* y) const {
     for (std::size_t k = 0; k < 3; ++k) y[3 + k] /= scales_[static_cast<std::size_t>(body.frame)][k];
   }
-  /// J x of a group. @param product one number for each of its rows
-  void multiply(const GameGroup& group, std::span<const double> x, double* product) const;
-  /// x += Jᵀ f of a group. @param forces one number for each of its rows
-  void add_transposed(const GameGroup& group, const double* forces, std::span<double> x) const;
+  /// J x. @param product one number for each row
+  void multiply(std::span<const double> x, std::vector<double>& product) const;
+  /// x += Jᵀ f. @param forces likewise
+  void add_transposed(std::span<const double> forces, std::span<double> x) const;
 
  private:
   /// A body that something leads, in a row.

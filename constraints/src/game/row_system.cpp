@@ -166,25 +166,13 @@ void RowSystem::solve_fully(const GameRows& rows, std::span<const double> guess,
 
 /// (J Jᵀ + C) x
 void RowSystem::multiply(const GameRows& rows, std::span<const double> x, std::span<double> product) {
-  const std::span<const GameGroup> groups = rows.groups();
   std::vector<double>&moved = gradients_.moved, &forces = gradients_.forces;
   moved.assign(rows.coordinates(), 0.0);
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    forces.assign(groups[g].count, 0.0);
-    std::size_t k = first(g);
-    for (const std::int32_t i : met(g)) forces[static_cast<std::size_t>(i)] = x[k++];
-    rows.add_transposed(groups[g], forces.data(), moved);
-  }
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    forces.resize(groups[g].count);
-    rows.multiply(groups[g], moved, forces.data());
-    std::size_t k = first(g);
-    for (const std::int32_t i : met(g)) {
-      const auto row = static_cast<std::size_t>(i);
-      product[k] = rows.rows()[groups[g].first + row].compliance * x[k] + forces[row];
-      ++k;
-    }
-  }
+  forces.assign(rows.rows().size(), 0.0);
+  for_met(rows, [&](std::size_t row, std::size_t k) { forces[row] = x[k]; });
+  rows.add_transposed(forces, moved);
+  rows.multiply(moved, forces);
+  for_met(rows, [&](std::size_t row, std::size_t k) { product[k] = rows.rows()[row].compliance * x[k] + forces[row]; });
 }
 
 }  // namespace limber::internal

@@ -27,6 +27,15 @@ class RowSystem {
   std::span<const std::int32_t> met(std::size_t group) const {
     return {met_.data() + first_met_[group], static_cast<std::size_t>(sizes_[group])};
   }
+  /// Calls visit(row, its number among those that hold) of all that hold.
+  template <class Visit>
+  void for_met(const GameRows& rows, const Visit& visit) const {
+    const std::span<const GameGroup> groups = rows.groups();
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      std::size_t k = first(g);
+      for (const std::int32_t i : met(g)) visit(groups[g].first + static_cast<std::size_t>(i), k++);
+    }
+  }
   /// What rows act on, ascending.
   std::span<const RowBody> bodies() const { return bodies_; }
   std::size_t components() const { return components_; }
