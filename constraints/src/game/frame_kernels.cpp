@@ -39,6 +39,13 @@ HWY_INLINE HWY_ATTR void Multiply(const Double8 (&m)[3][3], bool transposed, con
   }
 }
 
+/// R x, or Rᵀ x.
+HWY_INLINE HWY_ATTR void Turn(const Wide (*R)[3], bool back, const Wide* x, Wide* to) {
+  for (std::size_t i = 0; i < 3; ++i)
+    to[i] = hn::MulAdd(back ? R[0][i] : R[i][0], x[0],
+                       hn::MulAdd(back ? R[1][i] : R[i][1], x[1], hn::Mul(back ? R[2][i] : R[i][2], x[2])));
+}
+
 /// base + scale (a × b).
 HWY_INLINE HWY_ATTR void AddCross(const Wide* base, Wide scale, const Wide* a, const Wide* b, Wide* to) {
   for (std::size_t i = 0; i < 3; ++i) {
@@ -122,6 +129,51 @@ HWY_INLINE HWY_ATTR void Turned(Wide* r, Wide* q) {
   }
 }
 
+/// The same attitudes, of length 1.
+HWY_INLINE HWY_ATTR void Normalise(Wide* q) {
+  Wide square = hn::Mul(q[0], q[0]);
+  for (std::size_t i = 1; i < 4; ++i) square = hn::MulAdd(q[i], q[i], square);
+  const Wide norm = hn::Sqrt(square);
+  for (std::size_t i = 0; i < 4; ++i) q[i] = hn::Div(q[i], norm);
+}
+
+HWY_INLINE HWY_ATTR void TurnLanes(EightFrames& f, double time, std::size_t lane) {
+  const Doubles d;
+  const auto turns = hn::Gt(Get(f.turns_axes, lane), hn::Zero(d));
+  Wide x[3], momentum[3], body[3], spin[3], before[4], by[4], q[4], R[3][3], torque[3];
+  for (std::size_t i = 0; i < 3; ++i) x[i] = Get(f.now.turn[i], lane), torque[i] = Get(f.loads.torque[i], lane);
+  Multiply(f.momentum, true, x, lane, momentum);
+  for (std::size_t i = 0; i < 4; ++i) before[i] = Get(f.now.attitude[i], lane);
+  Rotation(before, R);
+  Turn(R, true, momentum, body);
+  Multiply(f.inverse_inertia, false, body, lane, spin);
+  Turn(R, false, spin, by + 1);
+  by[0] = hn::Set(d, 4.0 / time);  // a quaternion of any length
+  Product(by, before, q);
+  Normalise(q);
+  Rotation(q, R);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Wide root = Get(f.roots[i], lane);
+    Wide turn = hn::Zero(d), gain = hn::Zero(d);
+    for (std::size_t j = 0; j < 3; ++j) {
+      const Wide axis =
+          hn::MulAdd(R[j][0], Get(f.principal[0][i], lane),
+                     hn::MulAdd(R[j][1], Get(f.principal[1][i], lane), hn::Mul(R[j][2], Get(f.principal[2][i], lane))));
+      const Wide scale = hn::Div(axis, root);
+      turn = hn::MulAdd(scale, momentum[j], turn), gain = hn::MulAdd(scale, torque[j], gain);
+      Put(hn::IfThenElse(turns, scale, Get(f.turn_scale[i][j], lane)), f.turn_scale[i][j], lane);
+      Put(hn::IfThenElse(turns, hn::Mul(axis, root), Get(f.momentum[i][j], lane)), f.momentum[i][j], lane);
+    }
+    Put(hn::IfThenElse(turns, turn, x[i]), f.now.turn[i], lane);
+    Put(hn::IfThenElse(turns, gain, Get(f.loads.turn_gain[i], lane)), f.loads.turn_gain[i], lane);
+  }
+}
+
+HWY_ATTR void TurnFrames(const FrameArrays& all, double time) {
+  for (std::size_t g = 0; g < all.count; ++g)
+    for (std::size_t lane = 0; lane < kFramesAtOnce; lane += kDoubles) TurnLanes(all.frames[g], time, lane);
+}
+
 /// Where rows are of an attitude that the body has left, its momentum no longer tells how it turns: by the inertia in
 /// the middle of the substep.
 HWY_INLINE HWY_ATTR void FreeTurn(const EightFrames& f, double h, const Wide (*R)[3], const Wide* turn,
@@ -130,14 +182,12 @@ HWY_INLINE HWY_ATTR void FreeTurn(const EightFrames& f, double h, const Wide (*R
   const Wide half = hn::Set(d, 0.5 * h);
   Wide world[3], momentum[3], now[3], later[3], middle[3], spin[3];
   Multiply(f.momentum, true, turn, lane, world);
-  for (std::size_t i = 0; i < 3; ++i)
-    momentum[i] = hn::MulAdd(R[0][i], world[0], hn::MulAdd(R[1][i], world[1], hn::Mul(R[2][i], world[2])));
+  Turn(R, true, world, momentum);
   Multiply(f.inverse_inertia, false, momentum, lane, now);
   AddCross(momentum, half, momentum, now, later);
   Multiply(f.inverse_inertia, false, later, lane, middle);
   AddCross(middle, half, now, middle, spin);
-  for (std::size_t i = 0; i < 3; ++i)
-    world[i] = hn::MulAdd(R[i][0], spin[0], hn::MulAdd(R[i][1], spin[1], hn::Mul(R[i][2], spin[2])));
+  Turn(R, false, spin, world);
   Multiply(f.momentum, false, world, lane, free);
   const auto keeps = hn::Gt(Get(f.keeps_axes, lane), hn::Zero(d));
   for (std::size_t i = 0; i < 3; ++i) free[i] = hn::IfThenElse(keeps, free[i], turn[i]);
@@ -202,12 +252,10 @@ HWY_INLINE HWY_ATTR void EndLanes(EightFrames& f, double h, std::size_t lane, co
   Turned(r, turned);
   for (std::size_t i = 0; i < 4; ++i) before[i] = Get(f.now.attitude[i], lane);
   Product(turned, before, after);
-  Wide square = hn::Mul(after[0], after[0]);
-  for (std::size_t i = 1; i < 4; ++i) square = hn::MulAdd(after[i], after[i], square);
-  const Wide norm = hn::Sqrt(square);
+  Normalise(after);
   for (std::size_t i = 0; i < 4; ++i) {
     Put(turned[i], f.now.turned[i], lane);
-    Put(hn::IfThenElse(is_free, hn::Div(after[i], norm), before[i]), f.now.attitude[i], lane);
+    Put(hn::IfThenElse(is_free, after[i], before[i]), f.now.attitude[i], lane);
   }
 }
 
@@ -232,8 +280,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace limber::internal {
 
+HWY_EXPORT(TurnFrames);
 HWY_EXPORT(BeginFrames);
 HWY_EXPORT(EndFrames);
+
+void turn_frames(const FrameArrays& all, double time) { HWY_DYNAMIC_DISPATCH(TurnFrames)(all, time); }
 
 void begin_frames(const FrameArrays& all) { HWY_DYNAMIC_DISPATCH(BeginFrames)(all); }
 

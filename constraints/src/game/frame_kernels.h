@@ -23,10 +23,14 @@ struct EightFrames {
   Double8 momentum[3][3];         // L = momentumᵀ coordinates, world
   Double8 inverse_inertia[3][3];  // body axes, 1/(kg·m²)
   Double8 keeps_axes;             // 1: its rows stay while it turns, so that its momentum tells how; 0: else
+  Double8 turns_axes;             // 1: turn_frames() is for it; 0: else
+  Double8 principal[3][3];        // its principal axes in the body, as columns
+  Double8 roots[3];               // of the moments of inertia about them
   Double8 root_mass, per_root;    // √m, 1/√m; 0: led
   /// With a substep's loads and damping v becomes left v + gain, and so do the turn's coordinates.
   struct Loads {
     Double8 left, gain[3], turn_left, turn_gain[3];
+    Double8 torque[3];  // of which the turn's coordinates have turn_gain
   } loads;
   struct Now {
     Double8 shift[3], attitude[4], v[3], turn[3];
@@ -51,6 +55,8 @@ struct FrameArrays {
   }
 };
 
+/// Coordinates of turns become those about the principal axes as they will be after half of a time, by the momentum.
+void turn_frames(const FrameArrays& all, double time);
 /// Loads and damping; free motion, y with the answers of the substep before, and how frames have shifted.
 void begin_frames(const FrameArrays& all);
 /// Answers, and where frames go by them. @param pushed whether pushes move them too

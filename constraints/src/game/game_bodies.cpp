@@ -93,6 +93,8 @@ void GameBodies::begin_step(std::span<const ConstrainedBody> table, std::span<co
     bodies_.push_back(body);
     place_frame(bodies_.size() - 1, frame);
   }
+  turn_frames({.frames = frames_.data(), .count = frames_.size()}, plan_.step);
+  take_axes();
   const auto count = static_cast<std::size_t>(blocks) + 1;
   for (std::vector<Block8>* all : {&motion_, &free_, &answers_, &shapes_}) all->assign(count, {});
   pushes_.assign(bodies_.size() + 1, {});
@@ -118,42 +120,61 @@ void GameBodies::place_frame(std::size_t at, const RigidFrame& frame) {
   if (c.motion == FrameMotion::kKinematic) return;
   for (std::size_t i = 0; i < 3; ++i)
     if (frame.settings().locks.translation[i]) body.goes[static_cast<Eigen::Index>(i)] = 0.0;
+  if (c.motion == FrameMotion::kFree) {
+    body.root_mass = std::sqrt(c.mass);
+    of.root_mass.v[lane] = body.root_mass, of.per_root.v[lane] = 1.0 / body.root_mass;
+    tell_loads(at);
+  }
   body.roots = c.motion == FrameMotion::kLine ? Vec3(std::sqrt(line_inertia(c)), 0.0, 0.0)
                                               : Vec3(c.principal.moments.cwiseSqrt());
+  const Mat3 axes = to_matrix(c.principal.q_BP);
+  put(axes, of.principal, lane);
+  put(body.roots, of.roots, lane);
+  put(Mat3(axes * c.principal.moments.cwiseInverse().asDiagonal() * axes.transpose()), of.inverse_inertia, lane);
+  if (c.motion != FrameMotion::kLine && !body.turns_locked) {
+    of.turns_axes.v[lane] = 1.0;
+    put(Mat3::Identity(), of.momentum, lane);
+    put(frame.angular_momentum(c), of.now.turn, lane);
+    return;
+  }
   set_axes(at, turned(q, 0.5 * plan_.step * frame.angular_velocity(c)));
   if (c.motion != FrameMotion::kLine) put(body.turn_scale * frame.angular_momentum(c), of.now.turn, lane);
-  if (c.motion != FrameMotion::kFree) return;
-  body.root_mass = std::sqrt(c.mass);
-  of.root_mass.v[lane] = body.root_mass, of.per_root.v[lane] = 1.0 / body.root_mass;
-  const Mat3 axes = to_matrix(c.principal.q_BP);
-  put(Mat3(axes * c.principal.moments.cwiseInverse().asDiagonal() * axes.transpose()), of.inverse_inertia, lane);
-  tell_loads(at);
+}
+
+void GameBodies::take_axes() {
+  for (std::size_t at = 0; at < bodies_.size(); ++at) {
+    const EightFrames& of = frames_[at / kFramesAtOnce];
+    const std::size_t lane = at % kFramesAtOnce;
+    if (of.turns_axes.v[lane] > 0.0)
+      for (Eigen::Index i = 0; i < 3; ++i) bodies_[at].turn_scale.row(i) = vector_in(of.turn_scale[i], lane);
+  }
 }
 
 void GameBodies::keep_axes(std::int32_t at) {
   const auto i = static_cast<std::size_t>(at);
   GameBody& body = bodies_[i];
   body.keeps_axes = true;
+  frames_[i / kFramesAtOnce].turns_axes.v[i % kFramesAtOnce] = 0.0;
   if (body.led < 0 && !body.turns_locked) frames_[i / kFramesAtOnce].keeps_axes.v[i % kFramesAtOnce] = 1.0;
 }
 
+/// Of bodies on a line and with locks, whose inertia that turn_frames() does not know.
 void GameBodies::set_axes(std::size_t at, const Quaternion& attitude) {
   GameBody& body = bodies_[at];
   const FrameConstants& c = body.group->frame_constants();
   if (c.motion == FrameMotion::kLine) {
     body.turn_scale.row(0) = (attitude * c.line_axis).transpose() / body.roots.x();
-  } else if (body.turns_locked) {
+  } else {
     const Mat3 R = to_matrix(attitude);
     const TurnAxes turns(R * c.inertia * R.transpose(), settings(body).locks);
     body.roots = turns.moments.cwiseSqrt();
     for (Eigen::Index i = 0; i < 3; ++i)
       if (body.roots[i] > 0.0) body.turn_scale.row(i) = turns.axes.col(i).transpose() / body.roots[i];
-  } else {
-    body.turn_scale = body.roots.cwiseInverse().asDiagonal() * to_matrix(attitude * c.principal.q_BP).transpose();
   }
   EightFrames& of = frames_[at / kFramesAtOnce];
   put(body.turn_scale, of.turn_scale, at % kFramesAtOnce);
   put(Mat3(body.roots.cwiseAbs2().asDiagonal() * body.turn_scale), of.momentum, at % kFramesAtOnce);
+  put(body.turn_scale * vector_in(of.loads.torque, at % kFramesAtOnce), of.loads.turn_gain, at % kFramesAtOnce);
 }
 
 Vec3 GameBodies::momentum_of(std::size_t at) const {
@@ -163,18 +184,19 @@ Vec3 GameBodies::momentum_of(std::size_t at) const {
 }
 
 void GameBodies::turn_axes() {
+  turn_frames({.frames = frames_.data(), .count = frames_.size()}, plan_.length());
+  take_axes();
   for (std::size_t at = 0; at < bodies_.size(); ++at) {
     const GameBody& body = bodies_[at];
     const FrameConstants& c = body.group->frame_constants();
-    if (body.keeps_axes || c.motion == FrameMotion::kKinematic) continue;
     EightFrames& of = frames_[at / kFramesAtOnce];
+    if (body.keeps_axes || c.motion == FrameMotion::kKinematic || of.turns_axes.v[at % kFramesAtOnce] > 0.0) continue;
     const Quaternion q = quaternion_in(of.now.attitude, at % kFramesAtOnce);
     const Vec3 momentum = momentum_of(at);
     set_axes(at, q);
     const Vec3 omega = body.turn_scale.transpose() * (body.turn_scale * momentum);
     set_axes(at, turned(q, 0.5 * plan_.length() * omega));
     if (c.motion != FrameMotion::kLine) put(body.turn_scale * momentum, of.now.turn, at % kFramesAtOnce);
-    if (body.led < 0) tell_loads(at);
   }
 }
 
@@ -276,7 +298,7 @@ void GameBodies::tell_loads(std::size_t at) {
   const Vec3 acceleration = load.gravity + load.force / body.group->frame_constants().mass;
   of.loads.left.v[lane] = moving.left, of.loads.turn_left.v[lane] = turning.left;
   put(h * moving.first * acceleration.cwiseProduct(body.goes), of.loads.gain, lane);
-  put(h * turning.first * (body.turn_scale * load.torque), of.loads.turn_gain, lane);
+  put(h * turning.first * load.torque, of.loads.torque, lane);
 }
 
 Vec3 GameBodies::fall_of(std::int32_t number) const {
@@ -342,7 +364,7 @@ void GameBodies::end_beside_frame(std::size_t at) {
   if (body.led >= 0)
     turn_led(at, quaternion_in(frames_[at / kFramesAtOnce].now.turned, at % kFramesAtOnce));
   else if (plan_.seen)
-    show(at);
+    body.group->frame_in_parts(body.slot).set_pose(pose_of(at));
 }
 
 void GameBodies::move_modes(GameBody& body) {
@@ -393,9 +415,13 @@ void GameBodies::show(std::size_t at) {
   GameBody& body = bodies_[at];
   const EightFrames& of = frames_[at / kFramesAtOnce];
   const std::size_t lane = at % kFramesAtOnce;
-  body.group->frame_in_parts(body.slot).set_motion(
-      {quaternion_in(of.now.attitude, lane), body.start.p + vector_in(of.now.shift, lane)}, vector_in(of.now.v, lane),
-      momentum_of(at));
+  body.group->frame_in_parts(body.slot).set_motion(pose_of(at), vector_in(of.now.v, lane), momentum_of(at));
+}
+
+RigidTransform GameBodies::pose_of(std::size_t at) const {
+  const EightFrames& of = frames_[at / kFramesAtOnce];
+  const std::size_t lane = at % kFramesAtOnce;
+  return {quaternion_in(of.now.attitude, lane), bodies_[at].start.p + vector_in(of.now.shift, lane)};
 }
 
 /// Where its parent has brought it, turned as constraints have it.

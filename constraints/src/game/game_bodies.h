@@ -117,6 +117,7 @@ class GameBodies {
   void begin_beside_frame(std::size_t at, int number);
   void end_beside_frame(std::size_t at);
   void place_frame(std::size_t at, const RigidFrame& frame);
+  void take_axes();
   void set_axes(std::size_t at, const Quaternion& attitude);
   static const FrameSettings& settings(const GameBody& body) { return body.group->frame(body.slot).settings(); }
   void tell_loads(std::size_t at);
@@ -128,6 +129,7 @@ class GameBodies {
   void write_modes(const GameBody& body, std::vector<Block8>& to) const;
   void move_modes(GameBody& body);
   void show(std::size_t at);
+  RigidTransform pose_of(std::size_t at) const;
   Vec3 momentum_of(std::size_t at) const;
   SubstepModes& modes_of(const ModalModel& model);
 
