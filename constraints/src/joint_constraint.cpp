@@ -130,27 +130,19 @@ JointConstraint::RowPlan JointConstraint::row_of(int coordinate, Law law, double
 
 int JointConstraint::axis_of(int coordinate) const { return spec_.type == JointType::kPlanar ? coordinate : 0; }
 
-JointConstraint::Placement::Placement(const Vec3& from, const Vec3& to, const Mat3& axes_a, const Mat3& axes_b)
-    : o_a(from), o_b(to), d(axes_a.transpose() * (to - from)), R_a(axes_a), R_b(axes_b) {}
-
 JointConstraint::Instant JointConstraint::instant(const BodyStates& states, StepTime when) const {
   return {.a = a_.at(states, when), .b = b_.at(states, when)};
 }
 
-JointConstraint::Placement JointConstraint::place(const BodyStates& states, StepTime when) const {
-  const JointFrame a = a_.place(states, when), b = b_.place(states, when);
-  return {a.origin, b.origin, a.axes, b.axes};
-}
-
-double JointConstraint::raw_angle(const Placement& at, int i) const {
-  const Mat3 Q = at.R_a.transpose() * at.R_b;
+double JointConstraint::raw_angle(const Instant& at, int i) const {
+  const Mat3 Q = at.a.axes.transpose() * at.b.axes;
   if (spec_.type == JointType::kBall) return euler_xyz(Q)[i];
   const int x = (axis_of(i) + 1) % 3, y = (axis_of(i) + 2) % 3;
   return std::atan2(Q(y, x) - Q(x, y), Q(x, x) + Q(y, y));
 }
 
 /// Angles with the number of full turns that is nearest to the last step's.
-double JointConstraint::unwrapped(const Placement& at, int i) const {
+double JointConstraint::unwrapped(const Instant& at, int i) const {
   if (!is_rotation(spec_.type, i)) return at.d[axis_of(i)];
   const double raw = raw_angle(at, i);
   constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -158,7 +150,7 @@ double JointConstraint::unwrapped(const Placement& at, int i) const {
 }
 
 double JointConstraint::coordinate(int i, const BodyStates& states) const {
-  return unwrapped(place(states, StepTime::kStart), i);
+  return unwrapped(instant(states, StepTime::kStart), i);
 }
 
 // Gaps and their derivatives ------------------------------------------------------------------------------------------
@@ -171,7 +163,7 @@ std::array<JointConstraint::TurnAxes, 2> JointConstraint::turn_axes(const RowPla
   return {k == turning_axis() ? TurnAxes{j, k, -1.0} : TurnAxes{k, j, 1.0}, {}};
 }
 
-double JointConstraint::measured(const Placement& at, const RowPlan& row) const {
+double JointConstraint::measured(const Instant& at, const RowPlan& row) const {
   switch (row.measure) {
     case Measure::kTranslation:
       return at.d[row.axis];
@@ -179,26 +171,26 @@ double JointConstraint::measured(const Placement& at, const RowPlan& row) const 
       return at.d.x() - spec_.pitch * unwrapped(at, 0);
     case Measure::kAcross: {
       const TurnAxes turn = turn_axes(row)[0];
-      return turn.sign * at.R_a.col(turn.of_a).dot(at.R_b.col(turn.of_b));
+      return turn.sign * at.a.axes.col(turn.of_a).dot(at.b.axes.col(turn.of_b));
     }
     case Measure::kTurn:
-      return 2.0 * quaternion_from_matrix(at.R_a.transpose() * at.R_b).vector()[row.axis];
+      return 2.0 * quaternion_from_matrix(at.a.axes.transpose() * at.b.axes).vector()[row.axis];
     case Measure::kAngle:
       return unwrapped(at, row.coordinate);
     case Measure::kCone: {
-      const Vec3 x_a = at.R_a.col(0), x_b = at.R_b.col(0);
+      const Vec3 x_a = at.a.axes.col(0), x_b = at.b.axes.col(0);
       return std::atan2(x_a.cross(x_b).norm(), x_a.dot(x_b));
     }
   }
   return 0.0;
 }
 
-double JointConstraint::gap(const Placement& at, const RowPlan& row) const {
+double JointConstraint::gap(const Instant& at, const RowPlan& row) const {
   return row.sign * (measured(at, row) - row.zero);
 }
 
-JointConstraint::Direction JointConstraint::direction(const Placement& at, const RowPlan& row) const {
-  const Vec3 axis = row.sign * at.R_a.col(row.axis);
+JointConstraint::Direction JointConstraint::direction(const Instant& at, const RowPlan& row) const {
+  const Vec3 axis = row.sign * at.a.axes.col(row.axis);
   switch (row.measure) {
     case Measure::kTranslation:
       return {.linear = axis};
@@ -206,52 +198,53 @@ JointConstraint::Direction JointConstraint::direction(const Placement& at, const
       return {.linear = axis, .angular = -spec_.pitch * axis};
     case Measure::kAcross: {
       const TurnAxes turn = turn_axes(row)[0];
-      return {.angular = turn.sign * at.R_b.col(turn.of_b).cross(at.R_a.col(turn.of_a))};
+      return {.angular = turn.sign * at.b.axes.col(turn.of_b).cross(at.a.axes.col(turn.of_a))};
     }
     case Measure::kTurn: {
       // d (2 vec q) = w ω + ω × vec q, in the axes of a
-      const Quaternion q = normalized(quaternion_from_matrix(at.R_a.transpose() * at.R_b));
-      return {.angular = at.R_a * (q.w * Vec3::Unit(row.axis) + q.vector().cross(Vec3::Unit(row.axis)))};
+      const Quaternion q = normalized(quaternion_from_matrix(at.a.axes.transpose() * at.b.axes));
+      return {.angular = at.a.axes * (q.w * Vec3::Unit(row.axis) + q.vector().cross(Vec3::Unit(row.axis)))};
     }
     case Measure::kAngle:
       if (spec_.type != JointType::kBall) return {.angular = axis};
-      return {.angular = row.sign * (at.R_a * euler_rate(at.R_a.transpose() * at.R_b, row.coordinate))};
+      return {.angular = row.sign * (at.a.axes * euler_rate(at.a.axes.transpose() * at.b.axes, row.coordinate))};
     case Measure::kCone: {
-      const Vec3 normal = at.R_a.col(0).cross(at.R_b.col(0));
-      return {.angular = row.sign * (normal.norm() > 0.0 ? normal.normalized() : Vec3(-at.R_a.col(1)))};
+      const Vec3 normal = at.a.axes.col(0).cross(at.b.axes.col(0));
+      return {.angular = row.sign * (normal.norm() > 0.0 ? normal.normalized() : Vec3(-at.a.axes.col(1)))};
     }
   }
   return {};
 }
 
 /// What the angular part of direction() changes by with the axes, but for rows that turn_axes() tells.
-Vec3 JointConstraint::direction_change(const Placement& at, const RowPlan& row, const Mat3& dR_a,
+Vec3 JointConstraint::direction_change(const Instant& at, const RowPlan& row, const Mat3& dR_a,
                                        const Mat3& dR_b) const {
   if (row.measure == Measure::kCone) {
-    const Vec3 normal = at.R_a.col(0).cross(at.R_b.col(0)),
-               change = dR_a.col(0).cross(at.R_b.col(0)) + at.R_a.col(0).cross(dR_b.col(0));
+    const Vec3 normal = at.a.axes.col(0).cross(at.b.axes.col(0)),
+               change = dR_a.col(0).cross(at.b.axes.col(0)) + at.a.axes.col(0).cross(dR_b.col(0));
     const double size = normal.norm();
     if (!(size > 0.0)) return -row.sign * dR_a.col(1);
     return row.sign * (change - normal * (normal.dot(change) / (size * size))) / size;
   }
   if (row.measure == Measure::kScrew) return -spec_.pitch * dR_a.col(row.axis);
   if (spec_.type != JointType::kBall) return row.sign * dR_a.col(row.axis);
-  const Mat3 Q = at.R_a.transpose() * at.R_b, dQ = dR_a.transpose() * at.R_b + at.R_a.transpose() * dR_b;
-  return row.sign * (dR_a * euler_rate(Q, row.coordinate) + at.R_a * euler_rate_change(Q, dQ, row.coordinate));
+  const Mat3 Q = at.a.axes.transpose() * at.b.axes, dQ = dR_a.transpose() * at.b.axes + at.a.axes.transpose() * dR_b;
+  return row.sign * (dR_a * euler_rate(Q, row.coordinate) + at.a.axes * euler_rate_change(Q, dQ, row.coordinate));
 }
 
 /// In the middle of the step an angle φ about an axis that both parts share changes by its direction times the relative
 /// turn up to a factor: with Cayley vectors α of a and ρ of b against a, along the axis, |ρ| = 2 tan ½Δφ,
 ///   τ_b − τ_a = (1 + ¼α²)/(1 − ¼α·ρ) (1 − ½[α])⁻¹ρ,      (1 − ½[α])⁻¹ × the axis at the start = its mean
-JointConstraint::Direction JointConstraint::mean_direction(const Placement& start, const Placement& end,
-                                                           const Placement& at, const RowPlan& row,
-                                                           const Vec3& turn) const {
+JointConstraint::Direction JointConstraint::mean_direction(const BodyStates& states, const Instant& at,
+                                                           const RowPlan& row) const {
   Direction mean = direction(at, row);
   const bool turns = row.measure == Measure::kScrew || row.measure == Measure::kAngle;
   if (!turns || spec_.type == JointType::kBall) return mean;
   const int angle = row.measure == Measure::kScrew ? 0 : row.coordinate;
+  const Instant start = instant(states, StepTime::kStart), end = instant(states, StepTime::kEnd);
   const double half = 0.5 * (unwrapped(end, angle) - unwrapped(start, angle));
-  const Vec3 axis = start.R_a.col(row.axis), mean_axis = at.R_a.col(row.axis);
+  const Vec3 turn = a_.turn(states);
+  const Vec3 axis = start.a.axes.col(row.axis), mean_axis = at.a.axes.col(row.axis);
   const double tangent = std::tan(half), ratio = half == 0.0 ? 1.0 : half / tangent;
   mean.angular *=
       ratio * (1.0 - 0.5 * tangent * turn.dot(axis)) / ((1.0 + 0.25 * turn.squaredNorm()) * mean_axis.squaredNorm());
@@ -288,46 +281,47 @@ bool JointConstraint::measure_straight(const Instant& at, const RowPlan& plan, F
   if (plan.measure == Measure::kAcross || (plan.measure == Measure::kTurn && at.a.when == StepTime::kMiddle)) {
     for (const auto& [axis_a, axis_b, sign] : turn_axes(plan)) {
       if (sign == 0.0) continue;
-      at.a.add_axis(axis_a, sign * at.place.R_b.col(axis_b), of_a);
-      at.b.add_axis(axis_b, sign * at.place.R_a.col(axis_a), of_b);
+      at.a.add_axis(axis_a, sign * at.b.axes.col(axis_b), of_a);
+      at.b.add_axis(axis_b, sign * at.a.axes.col(axis_a), of_b);
     }
     return true;
   }
   if (plan.measure != Measure::kTranslation) return false;
-  const Vec3 n = plan.sign * at.place.R_a.col(plan.axis);
-  at.b.add_point(at.place.o_b, n, of_b);
-  at.a.add_axis(plan.axis, plan.sign * (at.place.o_b - at.place.o_a), of_a);
-  at.a.add_point(at.place.o_a, -n, of_a);
+  const Vec3 n = plan.sign * at.a.axes.col(plan.axis);
+  at.b.add_point(at.b.position, n, of_b);
+  at.a.add_axis(plan.axis, plan.sign * (at.b.position - at.a.position), of_a);
+  at.a.add_point(at.a.position, -n, of_a);
   return true;
 }
 
 void JointConstraint::measure_along(const Instant& at, const Direction& along, FrameMeasure& of_a, FrameMeasure& of_b) {
   if (!along.linear.isZero(0.0)) {
-    at.b.add_point(at.place.o_b, along.linear, of_b);
-    at.a.add_point(at.place.o_b, -along.linear, of_a);
+    at.b.add_point(at.b.position, along.linear, of_b);
+    at.a.add_point(at.b.position, -along.linear, of_a);
   }
   at.b.add_turn(along.angular, of_b);
   at.a.add_turn(-along.angular, of_a);
 }
 
 void JointConstraint::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
-  if (when == StepTime::kMiddle) return add_mean_rows(states, rows);
   const Instant at = instant(states, when);
   if (when == StepTime::kStart) {
     step_ = step;
-    axes_at_start_ = at.place.R_a;
+    axes_at_start_ = at.a.axes;
   }
-  const auto arm = [&](const FrameInstant& part) { return part.body < 0 ? 0.0 : (at.place.o_b - part.origin).norm(); };
-  const double length = std::max(arm(at.a), arm(at.b)),
-               nearest = distance_tolerance(internal::kConstraintsTuning.rows.joint_tolerance, length, at.place.o_b),
-               place_digits = digits_of(length + at.place.o_b.norm());
+  const auto arm = [&](const FrameInstant& part) { return part.body < 0 ? 0.0 : (at.b.position - part.origin).norm(); };
+  const double length = std::max(arm(at.a), arm(at.b)), from_origin = at.b.position.norm(),
+               nearest = internal::kConstraintsTuning.rows.joint_tolerance * length + digits_of(from_origin),
+               place_digits = digits_of(length + from_origin);
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const RowPlan& plan = rows_[i];
-    const bool distance = is_distance(plan);
     FrameMeasure of_a, of_b;
-    if (!measure_straight(at, plan, of_a, of_b)) measure_along(at, direction(at.place, plan), of_a, of_b);
+    if (!measure_straight(at, plan, of_a, of_b))
+      measure_along(at, when == StepTime::kMiddle ? mean_direction(states, at, plan) : direction(at, plan), of_a, of_b);
     RowParameters& law = rows.row(rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_))).law;
-    const double gap = this->gap(at.place, plan);
+    if (when == StepTime::kMiddle) continue;
+    const bool distance = is_distance(plan);
+    const double gap = this->gap(at, plan);
     write_law(plan, gap, law);
     law.tolerance = distance ? nearest : internal::kConstraintsTuning.rows.joint_tolerance;
     law.digits = distance ? place_digits : digits_of(1.0 + std::abs(gap));
@@ -335,25 +329,12 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
   }
 }
 
-/// What the rows are to be met by is told at the step's start.
-void JointConstraint::add_mean_rows(const BodyStates& states, ConstraintRows& rows) {
-  const Instant start = instant(states, StepTime::kStart), end = instant(states, StepTime::kEnd),
-                at{.a = a_.between(start.a, end.a), .b = b_.between(start.b, end.b)};
-  for (const RowPlan& plan : rows_) {
-    FrameMeasure of_a, of_b;
-    if (!measure_straight(at, plan, of_a, of_b))
-      measure_along(at, mean_direction(start.place, end.place, at.place, plan, a_.turn(states)), of_a, of_b);
-    rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_), {});
-  }
-}
-
 void JointConstraint::add_force_derivative(const BodyStates& states, std::span<const double> impulses,
                                            ForceDerivative& sum) const {
   using Of = ForceDerivative::Of;
   using By = ForceDerivative::By;
-  const Placement start = place(states, StepTime::kStart), end = place(states, StepTime::kEnd),
-                  mean(0.5 * (start.o_a + end.o_a), 0.5 * (start.o_b + end.o_b), 0.5 * (start.R_a + end.R_a),
-                       0.5 * (start.R_b + end.R_b));
+  const Instant start = instant(states, StepTime::kStart), end = instant(states, StepTime::kEnd),
+                mean{.a = a_.between(start.a, end.a), .b = b_.between(start.b, end.b)};
   // On b, by the mean rows; as the rows of the end would have it; and how the couple follows the turns of a and b.
   Vec3 force = Vec3::Zero(), force_end = Vec3::Zero();
   Mat3 by_a = Mat3::Zero(), by_b = Mat3::Zero();
@@ -366,14 +347,14 @@ void JointConstraint::add_force_derivative(const BodyStates& states, std::span<c
     if (along.angular.isZero(0.0)) continue;
     if (plan.measure == Measure::kAcross || plan.measure == Measure::kTurn) {
       for (const auto& [axis_a, axis_b, sign] : turn_axes(plan)) {  // the couple on b is b × a
-        by_a -= 0.5 * sign * p * cross_matrix(mean.R_b.col(axis_b)) * cross_matrix(end.R_a.col(axis_a));
-        by_b += 0.5 * sign * p * cross_matrix(mean.R_a.col(axis_a)) * cross_matrix(end.R_b.col(axis_b));
+        by_a -= 0.5 * sign * p * cross_matrix(mean.b.axes.col(axis_b)) * cross_matrix(end.a.axes.col(axis_a));
+        by_b += 0.5 * sign * p * cross_matrix(mean.a.axes.col(axis_a)) * cross_matrix(end.b.axes.col(axis_b));
       }
     } else {
       for (int k = 0; k < 3; ++k) {
         const Mat3 turn = 0.5 * cross_matrix(Vec3::Unit(k));
-        by_a.col(k) += p * direction_change(mean, plan, turn * end.R_a, Mat3::Zero());
-        by_b.col(k) += p * direction_change(mean, plan, Mat3::Zero(), turn * end.R_b);
+        by_a.col(k) += p * direction_change(mean, plan, turn * end.a.axes, Mat3::Zero());
+        by_b.col(k) += p * direction_change(mean, plan, Mat3::Zero(), turn * end.b.axes);
       }
     }
   }
@@ -382,7 +363,8 @@ void JointConstraint::add_force_derivative(const BodyStates& states, std::span<c
   if (a >= 0) sum.add_bending(a, -force, a_.displacements(states, shapes_));
   const Mat3 F = cross_matrix(force), F_end = cross_matrix(force_end);
   if (b >= 0) {
-    const Vec3 to_b = mean.o_b - states.origin(b, StepTime::kMiddle), arm = end.o_b - states.origin(b, StepTime::kEnd);
+    const Vec3 to_b = mean.b.position - states.origin(b, StepTime::kMiddle),
+               arm = end.b.position - states.origin(b, StepTime::kEnd);
     sum.add(b, Of::kMoment, b, By::kTurn, 0.5 * F * cross_matrix(arm) + by_b);
     if (a >= 0) {
       sum.add(b, Of::kForce, a, By::kTurn, -0.5 * F_end);
@@ -392,7 +374,7 @@ void JointConstraint::add_force_derivative(const BodyStates& states, std::span<c
     }
   }
   if (a >= 0) {
-    const Vec3 to_b = mean.o_b - states.origin(a, StepTime::kMiddle);
+    const Vec3 to_b = mean.b.position - states.origin(a, StepTime::kMiddle);
     sum.add(a, Of::kForce, a, By::kTurn, 0.5 * F_end);
     sum.add(a, Of::kMoment, a, By::kTurn, 0.5 * cross_matrix(to_b) * F_end - by_a);
     sum.add(a, Of::kMoment, a, By::kShift, -0.5 * F);
@@ -400,7 +382,7 @@ void JointConstraint::add_force_derivative(const BodyStates& states, std::span<c
 }
 
 void JointConstraint::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
-  const Placement at = place(states, when);
+  const Instant at = instant(states, when);
   for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i] = gap(at, rows_[i]);
 }
 
@@ -421,12 +403,12 @@ void JointConstraint::accept(const BodyStates& states, std::span<const double> i
       force_.locked += force * axes_at_start_.col(plan.axis);
   }
   if (!ends_step_ && !counts_turns_) return;
-  const Placement at = place(states, StepTime::kStart);  // the state has been taken: the step's end
+  const Instant at = instant(states, StepTime::kStart);  // the state has been taken: the step's end
   for (int i = 0; i < coordinates(); ++i) last_[static_cast<std::size_t>(i)] = unwrapped(at, i);
 }
 
 JointConstraint::Error JointConstraint::error(const BodyStates& states) const {
-  const Placement at = place(states, StepTime::kStart);
+  const Instant at = instant(states, StepTime::kStart);
   Vec3 distance = Vec3::Zero(), angle = Vec3::Zero();
   for (const RowPlan& plan : plan_) {
     if (plan.law == Law::kLocked) (is_distance(plan) ? distance : angle)[plan.axis] = gap(at, plan);

@@ -216,28 +216,6 @@ Vec3 MaterialFrame::position(const BodyStates& states, StepTime when) const {
   return states.pose(body_, when) * (rest_.origin + displace(states.amplitudes(body_, when)));
 }
 
-Mat3 MaterialFrame::axes(const BodyStates& states, StepTime when) const {
-  if (when == StepTime::kMiddle) return 0.5 * (axes(states, StepTime::kStart) + axes(states, StepTime::kEnd));
-  Quaternion q_WB = states.pose(body_, when).q;
-  if (!rotation_.empty()) q_WB = q_WB * quaternion_from_rotation_vector(turn(states.amplitudes(body_, when)));
-  return to_matrix(q_WB) * rest_.axes;
-}
-
-JointFrame MaterialFrame::place(const BodyStates& states, StepTime when) const {
-  if (body_ < 0) return rest_;
-  const RigidTransform& pose = states.pose(body_, when);
-  const Mat3 R = to_matrix(pose.q);
-  JointFrame at{.axes = R * rest_.axes};
-  if (displacement_.empty()) {
-    at.origin = pose.p + R * rest_.origin;
-    return at;
-  }
-  const std::span<const double> z = states.amplitudes(body_, when);
-  at.origin = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
-  if (!rotation_.empty()) at.axes = R * (rotation_by(turn(z)) * rest_.axes);
-  return at;
-}
-
 Vec3 MaterialFrame::velocity(const BodyStates& states, StepTime when) const {
   if (body_ < 0) return Vec3::Zero();
   const RigidTransform& X = states.pose(body_, when);
@@ -266,22 +244,22 @@ FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
   const RigidTransform& pose = states.pose(body_, when);
   const Mat3 R = to_matrix(pose.q);
   at.origin = pose.p;
-  at.bends = !displacement_.empty();
-  if (!at.bends) {
+  if (displacement_.empty()) {
     at.position = pose.p + R * rest_.origin;
     at.axes = R * rest_.axes;
     return at;
   }
   const std::span<const double> z = states.amplitudes(body_, when);
-  at.R_BW = R.transpose();
   at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
-  at.axes_B = rest_.axes;
+  FrameInstant::Bend& bend = at.bend.emplace();
+  bend.R_BW = R.transpose();
+  bend.axes_B = rest_.axes;
   if (!rotation_.empty()) {
-    at.turned = turn(z);
-    at.turning = turning_between(at.turned, at.turned);
-    at.axes_B = rotation_by(at.turned) * rest_.axes;
+    bend.turned = turn(z);
+    bend.turning = turning_between(bend.turned, bend.turned);
+    bend.axes_B = rotation_by(bend.turned) * rest_.axes;
   }
-  at.axes = R * at.axes_B;
+  at.axes = R * bend.axes_B;
   return at;
 }
 
@@ -292,27 +270,26 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
                   .position = 0.5 * (start.position + end.position),
                   .axes = 0.5 * (start.axes + end.axes),
                   .origin = 0.5 * (start.origin + end.origin)};
-  at.bends = start.bends;
-  if (!at.bends) return at;
-  at.R_BW = start.R_BW - 0.5 * start.R_BW * cross_matrix(at.states.turn(body_));
-  at.axes_B = 0.5 * (start.axes_B + end.axes_B);
-  if (!rotation_.empty()) at.turning = turning_between(start.turned, end.turned);
+  if (!start.bend) return at;
+  FrameInstant::Bend& bend = at.bend.emplace();
+  bend.R_BW = start.bend->R_BW - 0.5 * start.bend->R_BW * cross_matrix(at.states.turn(body_));
+  bend.axes_B = 0.5 * (start.bend->axes_B + end.bend->axes_B);
+  if (!rotation_.empty()) bend.turning = turning_between(start.bend->turned, end.bend->turned);
   return at;
 }
 
 void FrameInstant::bend_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
-  to.shift_B += R_BW * n;
-  to.turn_B += R_BW * (p - position).cross(n);
+  to.shift_B += bend->R_BW * n;
+  to.turn_B += bend->R_BW * (p - position).cross(n);
 }
 
 void FrameInstant::bend_axis(int axis, const Vec3& u, FrameMeasure& to) const {
-  to.turn_B += turning.transpose() * axes_B.col(axis).cross(R_BW * u);
+  to.turn_B += bend->turning.transpose() * bend->axes_B.col(axis).cross(bend->R_BW * u);
 }
 
 void FrameInstant::add_turn(const Vec3& a, FrameMeasure& to) const {
   to.angular += a;
-  if (!bends) return;
-  to.turn_B += turning.transpose() * (R_BW * a);
+  if (bend) to.turn_B += bend->turning.transpose() * (bend->R_BW * a);
 }
 
 void MaterialFrame::write_modal(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const {

@@ -70,14 +70,9 @@ class JointConstraint final : public Constraint {
   }
 
   /// Both frames at one instant.
-  struct Placement {
-    Placement(const Vec3& from, const Vec3& to, const Mat3& axes_a, const Mat3& axes_b);
-    Vec3 o_a, o_b, d;  // d in a's axes
-    Mat3 R_a, R_b;
-  };
   struct Instant {
     FrameInstant a, b;
-    Placement place{a.position, b.position, a.axes, b.axes};
+    Vec3 d = a.axes.transpose() * (b.position - a.position);  // in a's axes
   };
   /// What a row measures: d_i; one axis of b across one of a; q_i of the vector part of Q's quaternion, twice; the
   /// screw's d_x − pitch q; an angle q; how far x_b is from x_a.
@@ -110,16 +105,14 @@ class JointConstraint final : public Constraint {
   };
 
   std::array<TurnAxes, 2> turn_axes(const RowPlan& row) const;
-  Placement place(const BodyStates& states, StepTime when) const;
   Instant instant(const BodyStates& states, StepTime when) const;
-  double raw_angle(const Placement& at, int i) const;
-  double unwrapped(const Placement& at, int i) const;
-  double measured(const Placement& at, const RowPlan& row) const;
-  double gap(const Placement& at, const RowPlan& row) const;
-  Direction direction(const Placement& at, const RowPlan& row) const;
-  Vec3 direction_change(const Placement& at, const RowPlan& row, const Mat3& dR_a, const Mat3& dR_b) const;
-  Direction mean_direction(const Placement& start, const Placement& end, const Placement& at, const RowPlan& row,
-                           const Vec3& turn) const;
+  double raw_angle(const Instant& at, int i) const;
+  double unwrapped(const Instant& at, int i) const;
+  double measured(const Instant& at, const RowPlan& row) const;
+  double gap(const Instant& at, const RowPlan& row) const;
+  Direction direction(const Instant& at, const RowPlan& row) const;
+  Vec3 direction_change(const Instant& at, const RowPlan& row, const Mat3& dR_a, const Mat3& dR_b) const;
+  Direction mean_direction(const BodyStates& states, const Instant& at, const RowPlan& row) const;
   int axis_of(int coordinate) const;
   int turning_axis() const { return spec_.type == JointType::kPlanar ? 2 : 0; }  // of what turns about one alone
   static bool is_distance(const RowPlan& row) {
@@ -133,7 +126,6 @@ class JointConstraint final : public Constraint {
   void plan_locked_rows();
   void plan_limits();
   void plan_actuation();
-  void add_mean_rows(const BodyStates& states, ConstraintRows& rows);
   bool measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a, FrameMeasure& of_b) const;
   static void measure_along(const Instant& at, const Direction& along, FrameMeasure& of_a, FrameMeasure& of_b);
   void write_law(const RowPlan& plan, double gap, RowParameters& law) const;

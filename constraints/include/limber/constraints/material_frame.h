@@ -14,6 +14,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <vector>
@@ -32,30 +33,32 @@ struct FrameMeasure {
 
 /// A frame at one time of a step. In the middle of it axes are the mean of both ends, not orthonormal.
 struct FrameInstant {
+  /// What counts where modes show, in body axes.
+  struct Bend {
+    Mat3 R_BW, axes_B;  ///< R_BW: in the middle R'ᵀ (BodyStates)
+    /// What the axes turn by per unit of Θ dz; in the middle the Cayley vector of all of it, of Θ Δz.
+    Mat3 turning = Mat3::Identity();
+    Vec3 turned = Vec3::Zero();  ///< Θ z, at the step's ends
+  };
   BodyStates states;
   StepTime when = StepTime::kStart;
   Index body = -1;
   Vec3 position = Vec3::Zero();  ///< of the frame's origin, world, m
   Mat3 axes = Mat3::Identity();  ///< world
   Vec3 origin = Vec3::Zero();    ///< of the body, world, m
-  Mat3 R_BW = Mat3::Identity();  ///< in the middle R'ᵀ (BodyStates); this and what follows where modes show
-  Mat3 axes_B = Mat3::Identity();
-  /// What the axes turn by in the body per unit of Θ dz; in the middle the Cayley vector of all of it, of Θ Δz.
-  Mat3 turning = Mat3::Identity();
-  Vec3 turned = Vec3::Zero();  ///< Θ z, at the step's ends
-  bool bends = false;          ///< modes show: what is in body axes counts
+  std::optional<Bend> bend{};
 
   /// Adds the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
   /// @param p, n world
   void add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
     to.linear += n;
     to.angular += (p - origin).cross(n);
-    if (bends) bend_point(p, n, to);
+    if (bend) bend_point(p, n, to);
   }
   /// Adds what u · (an axis of the frame) changes by, u held: axis × u · its turn. @param axis 0 to 2. @param u world
   void add_axis(int axis, const Vec3& u, FrameMeasure& to) const {
     to.angular += axes.col(axis).cross(u);
-    if (bends) bend_axis(axis, u, to);
+    if (bend) bend_axis(axis, u, to);
   }
   /// Adds the angular velocity along a. @param a world
   void add_turn(const Vec3& a, FrameMeasure& to) const;
@@ -86,9 +89,6 @@ class MaterialFrame {
   std::span<const Vec3> displacements(const BodyStates& states, std::vector<Vec3>& room) const;
 
   Vec3 position(const BodyStates& states, StepTime when) const;  ///< world, m
-  Mat3 axes(const BodyStates& states, StepTime when) const;      ///< world, orthonormal
-  /// Both, at one of the step's ends.
-  JointFrame place(const BodyStates& states, StepTime when) const;
   Vec3 velocity(const BodyStates& states, StepTime when) const;  ///< of the point, world, m/s
   /// The Cayley vector of the body's turn over the step (BodyStates), and to first order that of the deformation.
   Vec3 turn(const BodyStates& states) const;
