@@ -158,7 +158,6 @@ struct FieldTuning {
   /// Directions along which it is looked whether bodies stay apart [4 to 16]: time alone, but for what goes by.
   int looks_apart = 8;
   double looked_enough = 0.98;  ///< of their distance, the best gap at which none is looked at any more: time alone
-  double deepest_exit = 2.0;    ///< of its deepest nearest point: a patch's longest way out [1.4 to 4]. [path]
 };
 
 struct CollisionTuning {

@@ -104,14 +104,23 @@ double deepest_gap(const std::vector<ContactPoint>& contacts) {
   return depth;
 }
 
-/// Brings b along a direction as near to a as makes an exact contact of that depth, and no nearer.
+/// Brings b along a direction, from afar, as near to a as makes an exact contact of that depth, and no nearer: with a
+/// ball's middle in a thin plate contacts are less deep again.
 void bring_together(TwoWays& a, TwoWays& b, const Vec3& direction, const std::vector<double>& z, double depth) {
-  double near = 0.0, far = 1.0;
   const Quaternion turn = b.exact.pose.q;
-  for (int halving = 0; halving < 14; ++halving) {
+  const auto contacts_at = [&](double distance) {
+    b.exact.place({turn, distance * direction}, z);
+    return contacts_of(a.exact, b.exact, 1e-3);
+  };
+  double near = 0.0, far = 1.0;
+  for (int halving = 0; halving < 10; ++halving) {
     const double middle = 0.5 * (near + far);
-    b.exact.place({turn, middle * direction}, z);
-    (deepest_gap(contacts_of(a.exact, b.exact, 1e-3)) > depth ? near : far) = middle;
+    (contacts_at(middle).empty() ? far : near) = middle;
+  }
+  while (near > 0.0 && !(deepest_gap(contacts_at(near)) > depth)) far = near, near -= 0.5 * depth;
+  for (int halving = 0; halving < 5; ++halving) {
+    const double middle = 0.5 * (near + far);
+    (deepest_gap(contacts_at(middle)) > depth ? near : far) = middle;
   }
   b.place({turn, near * direction}, z);
 }
@@ -476,6 +485,26 @@ TEST(FieldContacts, PatchesHaveOneWayOut) {
           EXPECT_GT(c.normal.dot(d.normal), 0.0) << depth;
         }
   }
+}
+
+// A box on another of its size, a little off, and sunk in farther than it is off: the nearest points of the corners are
+// on each other's sides.
+TEST(FieldContacts, ASunkBoxLeavesUpwards) {
+  const Vec3 half(0.15, 0.12, 0.09);
+  TwoWays below(Shape{Box{half}}),
+      above(testing::wavy_model(boundary_surface(testing::solid_box(half, {1, 1, 1})).surface, 0));
+  below.place({});
+  for (const double depth : {0.02, 0.04, 0.06})
+    for (const double turn : {0.0, 0.03, 1.5, 3.1}) {
+      const Vec3 at(0.011, -0.007, 2.0 * half.z() - depth);
+      above.place({quaternion_from_rotation_vector({0.0, 0.0, turn}), at});
+      const std::vector<ContactPoint> found = by_fields(below, above, 1e-3);
+      EXPECT_NEAR(deepest_gap(found), depth, 0.1 * depth) << turn;
+      for (const ContactPoint& c : found)
+        if (c.gap < 0.0) {
+          EXPECT_LT(c.normal.z(), -0.9) << depth << ' ' << turn << ' ' << c.gap;
+        }
+    }
 }
 
 TEST(FieldContacts, RigidShapesAreMetAsByNarrowPhase) {

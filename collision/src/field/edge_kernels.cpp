@@ -261,24 +261,39 @@ HWY_ATTR std::size_t NearEdges(const FieldQuery& query, const ShellView& shell, 
   return found;
 }
 
+// From point to point along a straight way, then in eighths. The face that is left is the nearest one just outside:
+// inside another may be.
 HWY_ATTR bool FirstExit(const FieldQuery& query, const float* from, const float* to, float step, FieldHit* exit) {
   const Floats d;
   Ways ways(query, {All(from[0]), All(from[1]), All(from[2])}, {All(to[0]), All(to[1]), All(to[2])});
   ways.CarryBackEnds(query);
+  float values[kLanes + 1] = {};  // of the point before a vector of them, then of these
+  const auto look = [&](float start, float part) HWY_ATTR {
+    const F along = hn::MulAdd(hn::Iota(d, 0.0f), All(part), All(start));
+    hn::StoreU(DistanceOf(query.field, ways.Rest(along)).value, d, values + 1);
+  };
+  // The first of them between which and the next one the sign changes; kLanes + 1: none.
+  const auto change = [&](std::size_t first) {
+    while (first < kLanes && (values[first] < 0.0f) == (values[first + 1] < 0.0f)) ++first;
+    return first < kLanes ? first : kLanes + 1;
+  };
   const float length = hn::GetLane(ways.Length());
   const int points = std::clamp(static_cast<int>(length / step) + 2, 2, 96);
-  const F part = All(1.0f / static_cast<float>(points - 1));
-  float values[kLanes + 1] = {};  // the last of the vector of points before, then these
+  const float part = 1.0f / static_cast<float>(points - 1), eighth = part / static_cast<float>(kLanes);
   for (int first = 0; first < points; first += static_cast<int>(kLanes)) {
-    const F along = hn::Mul(hn::Iota(d, static_cast<float>(first)), part);
-    hn::StoreU(DistanceOf(query.field, ways.Rest(along)).value, d, values + 1);
-    for (int i = first == 0 ? 1 : 0; i < static_cast<int>(kLanes); ++i) {
-      if ((values[i] < 0.0f) == (values[i + 1] < 0.0f)) continue;
-      const F at = hn::Mul(All(static_cast<float>(first + i - 1) + values[i] / (values[i] - values[i + 1])), part);
-      const Points r = ways.Rest(at);
+    look(part * static_cast<float>(first), part);
+    const std::size_t i = change(first == 0 ? 1 : 0);
+    if (i <= kLanes) {
+      const float start = part * (static_cast<float>(first + static_cast<int>(i)) - 1.0f), before = values[i];
+      look(start + eighth, eighth);
+      values[0] = before;
+      const std::size_t j = std::min(change(0), kLanes - 1);
+      const float before_it = start + eighth * static_cast<float>(j);
+      const F outside = All(before_it + eighth);
+      const Points r = ways.Rest(outside);
       Lanes lanes;
-      lanes.Store(ways.At(at), r, DistanceOf(query.field, r));
-      *exit = lanes.Hit(0, 0, hn::GetLane(at));
+      lanes.Store(ways.At(outside), r, DistanceOf(query.field, r));
+      *exit = lanes.Hit(0, 0, before_it + eighth * values[j] / (values[j] - values[j + 1]));
       return exit->along <= 1.0f;
     }
     values[0] = values[kLanes];

@@ -118,12 +118,36 @@ FoundSide on_foot(const SurfaceFoothold& foot) {
   return side;
 }
 
+Index& PatchExits::sample_of(Index vertex) { return sample_of_[static_cast<std::size_t>(vertex)]; }
+
+// How far along a line from a point inside the surface ends, as a part of it.
+float PatchExits::part_inside(const Vec3f& from, const Vec3f& to) const {
+  FieldHit exit;
+  const auto step = static_cast<float>(view_.other->shell().cell());
+  return first_exit(query_, from.data(), to.data(), step, exit) ? exit.along : 1.0f;
+}
+
+// The part of a triangle's area vector that is inside, shared by its corners that are; other's frame.
+Vec3f PatchExits::area_inside(Index t, Index corner) {
+  const Triangle& of = view_.mine->shell().surface().triangle(t);
+  const auto v = static_cast<std::size_t>(std::ranges::find(of, corner) - of.begin());
+  const std::size_t a = (v + 1) % 3, b = (v + 2) % 3;
+  TrianglePointsf x = corners_of(*view_.mine, t);
+  for (Vec3f& corner_of_it : x) corner_of_it = view_.placed(corner_of_it);
+  const Vec3f area = 0.5f * (x[1] - x[0]).cross(x[2] - x[0]);
+  const bool with_a = sample_of(of[a]) >= 0, with_b = sample_of(of[b]) >= 0;
+  if (with_a && with_b) return area / 3.0f;
+  if (!with_a && !with_b) return part_inside(x[v], x[a]) * part_inside(x[v], x[b]) * area;
+  const std::size_t in = with_a ? a : b, out = with_a ? b : a;
+  return 0.5f * (1.0f - (1.0f - part_inside(x[v], x[out])) * (1.0f - part_inside(x[in], x[out]))) * area;
+}
+
 void PatchExits::find(const FieldView& view, std::span<const SampleFoot> samples) {
-  const DeformedPointshell& body = *view.mine;
-  const CollisionSurface& surface = body.shell().surface();
+  view_ = view, query_ = view.query;
+  set_frame(query_, Eigen::Matrix3f::Identity(), Vec3f::Zero());
+  const CollisionSurface& surface = view.mine->shell().surface();
   if (sample_of_.size() < static_cast<std::size_t>(surface.vertices()))
     sample_of_.resize(static_cast<std::size_t>(surface.vertices()), -1);
-  const auto sample_of = [&](Index v) -> Index& { return sample_of_[static_cast<std::size_t>(v)]; };
   // No more samples than vertices: the room of the largest surface once.
   if (patches_.capacity() < sample_of_.size()) patches_.reserve(sample_of_.size()), joined_.reset(sample_of_.size());
   joined_.reset(samples.size());
@@ -134,25 +158,19 @@ void PatchExits::find(const FieldView& view, std::span<const SampleFoot> samples
     if (samples[i].gap < 0.0f)
       for (const Index w : surface.vertex_neighbours(samples[i].vertex))
         if (sample_of(w) >= 0) joined_.join(static_cast<Index>(i), sample_of(w));
-  for (const SampleFoot& sample : samples) sample_of(sample.vertex) = -1;
-  const auto root = [&](std::size_t i) { return static_cast<std::size_t>(joined_.root(static_cast<Index>(i))); };
-  const auto deepest = static_cast<float>(collision_tuning().field.deepest_exit);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!(samples[i].gap < 0.0f)) continue;
-    const Vec3f area = view.turn * area_vector(body, samples[i].vertex);
-    Patch& patch = patches_[root(i)];
-    patch.way.direction -= area, patch.area += area.norm();
-    patch.way.most = std::max(patch.way.most, -deepest * samples[i].gap);
-    for (std::size_t j = 0; j < i && !patch.disagrees; ++j)
-      patch.disagrees = samples[j].gap < 0.0f && root(j) == root(i) && samples[j].normal.dot(samples[i].normal) <= 0.0f;
+    Patch& patch = patches_[static_cast<std::size_t>(joined_.root(static_cast<Index>(i)))];
+    for (const Index t : surface.vertex_triangles(samples[i].vertex)) {
+      const Vec3f area = area_inside(t, samples[i].vertex);
+      patch.way -= area, patch.area += area.norm();
+    }
   }
+  for (const SampleFoot& sample : samples) sample_of(sample.vertex) = -1;
   const auto least = static_cast<float>(collision_tuning().field.least_patch);
   for (Patch& patch : patches_) {
-    const float length = patch.way.direction.norm();
-    if (patch.disagrees && length > least * patch.area)
-      patch.way.direction /= length;
-    else
-      patch.disagrees = false;
+    const float length = patch.way.norm();
+    patch.way = length > least * patch.area ? Vec3f(patch.way / length) : Vec3f::Zero();
   }
 }
 
@@ -256,7 +274,8 @@ void FieldContacts::settle_foot(const FieldView& view, const FieldHit& hit, Samp
   sample.normal = !on_face && distance > directionless ? Vec3f(out / sample.gap) : Vec3f(outward.normalized());
 }
 
-// Vertices inside whose own surface does not lie on the side that their nearest point would push them to.
+// Vertices inside whose own surface does not lie on the side that their nearest point would push them to: of two boxes
+// that lie all but flush on each other, the corners are nearest to each other's sides.
 void FieldContacts::leave_by_patches(const FieldView& view) {
   const auto leaning = static_cast<float>(collision_tuning().field.leaning);
   bool known = false;
@@ -266,19 +285,18 @@ void FieldContacts::leave_by_patches(const FieldView& view) {
       continue;
     if (!known) patches_.find(view, samples_);
     known = true;
-    const PatchExits::Way* way = patches_.way(i);
-    if (way == nullptr) continue;
+    const Vec3f& way = patches_.way(i);
+    const DeformedPointshell& other = *view.other;
+    const Vec3f far = sample.at + (other.high() - other.low()).norm() * way;
+    FieldHit exit;
     FieldQuery query = view.query;
     set_frame(query, Eigen::Matrix3f::Identity(), Vec3f::Zero());
-    const DeformedPointshell& other = *view.other;
-    const Vec3f far = sample.at + way->most * way->direction;
-    FieldHit exit;
     if (!first_exit(query, sample.at.data(), far.data(), static_cast<float>(other.shell().cell()), exit)) continue;
     const Pierced through = walk_to_face(other, other.shell().triangle_near(exit), sample.at, far);
     if (through.triangle < 0 || !(through.along > 0.0f && through.along <= 1.0f)) continue;
     const Vec3f point = sample.at + through.along * (far - sample.at);
     sample.foot = foot_on(other, through.triangle, point);
-    sample.normal = way->direction, sample.gap = -(point - sample.at).norm();
+    sample.normal = way, sample.gap = -(point - sample.at).norm();
   }
 }
 

@@ -200,24 +200,26 @@ bool FieldEdges::unhindered(EdgePair& pair, const Vec3f& motion) const {
   return pair.direction == direction || end < -passed_;
 }
 
-// Where two triangles intersect, an edge of one goes through the other at each end: piercings with a triangle pair in
+// Where two facets intersect, an edge of one goes through the other at each end: piercings with a pair of facets in
 // common belong to one loop. Sorts them by loop.
 void FieldEdges::find_loops() {
   crossed_.clear();
   for (std::size_t i = 0; i < piercings_.size(); ++i) {
     const Piercing& p = piercings_[i];
-    for (const Index t : view_[p.of].mine->shell().surface().edge_triangles(p.edge)) {
-      const auto of_a = static_cast<std::uint64_t>(p.of == 0 ? t : p.face),
-                 of_b = static_cast<std::uint64_t>(p.of == 0 ? p.face : t);
+    const Pointshell &mine = view_[p.of].mine->shell(), &other = view_[p.of].other->shell();
+    for (const Index t : mine.surface().edge_triangles(p.edge)) {
+      const auto of_mine = static_cast<std::uint64_t>(mine.facet(t)),
+                 of_other = static_cast<std::uint64_t>(other.facet(p.face));
+      const auto of_a = p.of == 0 ? of_mine : of_other, of_b = p.of == 0 ? of_other : of_mine;
       crossed_.push_back({of_a << 32 | of_b, static_cast<Index>(i)});
     }
   }
   std::ranges::sort(crossed_, [](const Crossed& x, const Crossed& y) {
-    return std::tie(x.triangles, x.piercing) < std::tie(y.triangles, y.piercing);
+    return std::tie(x.facets, x.piercing) < std::tie(y.facets, y.piercing);
   });
   loops_.reset(piercings_.size());
   for (std::size_t i = 1; i < crossed_.size(); ++i)
-    if (crossed_[i].triangles == crossed_[i - 1].triangles) loops_.join(crossed_[i].piercing, crossed_[i - 1].piercing);
+    if (crossed_[i].facets == crossed_[i - 1].facets) loops_.join(crossed_[i].piercing, crossed_[i - 1].piercing);
   for (std::size_t i = 0; i < piercings_.size(); ++i) piercings_[i].loop = loops_.root(static_cast<Index>(i));
   std::ranges::sort(piercings_, [](const Piercing& x, const Piercing& y) {
     return std::tie(x.loop, x.of, x.edge, x.face) < std::tie(y.loop, y.of, y.edge, y.face);
@@ -228,31 +230,50 @@ void FieldEdges::find_loops() {
   piercings_.erase(repeated, piercings_.end());
 }
 
-// Edges that stick out and have crossed on a loop: those that lead out, and those of which each goes through a face
+// Edges that stick out and have crossed on a loop: those that lead out, and those of which each goes through a facet
 // next to the other.
 void FieldEdges::find_crossings(std::size_t first, std::size_t end) {
   crossings_.clear();
   for (std::size_t i = first; i < end; ++i) {
     const Piercing& p = piercings_[i];
+    const Pointshell& other = view_[p.of].other->shell();
     for (int c = 0; c < 3; ++c) {
-      const Index other = view_[p.of].other->shell().surface().edge_of(p.face, c);
-      EdgePair pair;
-      if (!view_[p.of].other->shell().sticks_out(other) ||
-          !nearest_of_edges(p.of == 0 ? p.edge : other, p.of == 0 ? other : p.edge, pair))
-        continue;
-      if (touches(pair)) turn(pair, -1.0f);
-      pair.leads_out = in_normal_cone(1, pair.f, -pair.direction) && in_normal_cone(0, pair.e, pair.direction);
-      if (pair.leads_out || goes_through(other, 1 - p.of, p.edge, first, end)) crossings_.push_back(pair);
+      const Index edge = other.surface().edge_of(p.face, c);
+      if (other.sticks_out(edge)) cross(p, edge, first, end);
+    }
+    for (std::size_t j = first; j < end; ++j) {
+      const Piercing& back = piercings_[j];
+      const bool seen = j > first && piercings_[j - 1].of == back.of && piercings_[j - 1].edge == back.edge;
+      if (back.of != p.of && !seen && is_next_to(other, back.edge, p.face)) cross(p, back.edge, first, end);
     }
   }
 }
 
-// Whether an edge goes through a face next to one of the other surface, on a loop.
+// Whether an edge bounds the facet of a face, and not the face.
+bool FieldEdges::is_next_to(const Pointshell& body, Index edge, Index face) {
+  const auto around = body.surface().edge_triangles(edge);
+  return std::ranges::find(around, face) == around.end() &&
+         std::ranges::any_of(around, [&](Index t) { return body.facet(t) == body.facet(face); });
+}
+
+// An edge that goes through a facet and one that bounds it, if they have crossed.
+void FieldEdges::cross(const Piercing& p, Index other, std::size_t first, std::size_t end) {
+  EdgePair pair;
+  if (!nearest_of_edges(p.of == 0 ? p.edge : other, p.of == 0 ? other : p.edge, pair)) return;
+  if (touches(pair)) turn(pair, -1.0f);
+  pair.leads_out = in_normal_cone(1, pair.f, -pair.direction) && in_normal_cone(0, pair.e, pair.direction);
+  if (pair.leads_out || goes_through(other, 1 - p.of, p.edge, first, end)) crossings_.push_back(pair);
+}
+
+// Whether an edge goes through a facet next to one of the other surface, on a loop.
 bool FieldEdges::goes_through(Index edge, int of, Index other, std::size_t first, std::size_t end) const {
-  const auto next_to = view_[of].other->shell().surface().edge_triangles(other);
+  const Pointshell& body = view_[of].other->shell();
+  const auto next_to = body.surface().edge_triangles(other);
   return std::any_of(piercings_.begin() + static_cast<std::ptrdiff_t>(first),
                      piercings_.begin() + static_cast<std::ptrdiff_t>(end), [&](const Piercing& p) {
-                       return p.of == of && p.edge == edge && std::ranges::find(next_to, p.face) != next_to.end();
+                       return p.of == of && p.edge == edge && std::ranges::any_of(next_to, [&](Index t) {
+                                return body.facet(t) == body.facet(p.face);
+                              });
                      });
 }
 

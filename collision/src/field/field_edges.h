@@ -39,7 +39,7 @@ class FieldEdges {
     bool leads_out = true;  ///< of edges that have crossed: against the direction both surfaces part there
   };
   struct Crossed {
-    std::uint64_t triangles;
+    std::uint64_t facets;
     Index piercing;
   };
 
@@ -57,6 +57,8 @@ class FieldEdges {
   void find_loops();
   void cross_loop(std::size_t first, std::size_t end);
   void find_crossings(std::size_t first, std::size_t end);
+  static bool is_next_to(const Pointshell& body, Index edge, Index face);
+  void cross(const Piercing& p, Index other, std::size_t first, std::size_t end);
   bool goes_through(Index edge, int of, Index other, std::size_t first, std::size_t end) const;
   void find_ways_out(std::size_t first, std::size_t end);
   const EdgePair& narrowest_crossing(std::size_t first, std::size_t end) const;

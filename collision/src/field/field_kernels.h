@@ -158,7 +158,8 @@ std::size_t near_samples(const FieldQuery& query, const ShellView& shell, const 
 std::size_t near_edges(const FieldQuery& query, const ShellView& shell, const SampleBounds& ends,
                        const std::uint32_t* clusters, std::size_t count, float step, FieldHit* hits);
 
-/// Where a straight way from an inside point first leaves. @param step see near_edges() @return false: nowhere on it
+/// Where a straight way from an inside point first leaves: the part of it as `along`, and the field just outside.
+/// @param step see near_edges() @return false: nowhere on it
 bool first_exit(const FieldQuery& query, const float from[3], const float to[3], float step, FieldHit& exit);
 
 /// The distance at one point, for tests and for what is asked one by one.

@@ -75,28 +75,27 @@ struct SampleFoot {
   float gap = 0.0f;              ///< m
 };
 
-/// Patches of inside vertices that edges join, whose nearest points do not agree on a way out: two of them at right
-/// angles or more.
+/// Patches of inside vertices that edges join, each with one way out: against the area vector of its part inside.
 class PatchExits {
  public:
   void find(const FieldView& view, std::span<const SampleFoot> samples);
-  /// Unit, in the field's frame, for the vertex's surface to move along, and the most that it should have to, m; null
-  /// of a vertex whose patch agrees, or whose area vectors all but cancel.
-  struct Way {
-    Vec3f direction = Vec3f::Zero();
-    float most = 0.0f;
-  };
-  const Way* way(std::size_t sample) {
-    const Patch& patch = patches_[static_cast<std::size_t>(joined_.root(static_cast<Index>(sample)))];
-    return patch.disagrees ? &patch.way : nullptr;
+  /// Unit, in the field's frame, for an inside vertex's surface to move along; zero of a patch whose area vectors all
+  /// but cancel.
+  const Vec3f& way(std::size_t sample) {
+    return patches_[static_cast<std::size_t>(joined_.root(static_cast<Index>(sample)))].way;
   }
 
  private:
   struct Patch {
-    Way way{};
+    Vec3f way = Vec3f::Zero();
     float area = 0.0f;
-    bool disagrees = false;
   };
+  Index& sample_of(Index vertex);
+  float part_inside(const Vec3f& from, const Vec3f& to) const;
+  Vec3f area_inside(Index triangle, Index corner);
+
+  FieldView view_;
+  FieldQuery query_{};   ///< of points in the field's frame
   DisjointSets joined_;  ///< samples
   std::vector<Patch> patches_;
   std::vector<Index> sample_of_;  ///< per vertex; −1: not inside. All −1 between calls

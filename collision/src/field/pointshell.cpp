@@ -4,6 +4,7 @@
 #include <cmath>
 #include <variant>
 
+#include "limber/core/disjoint_sets.h"
 #include "limber/mesh/closest_point.h"
 #include "tuning.h"
 
@@ -134,10 +135,16 @@ bool Pointshell::turns_outwards(Index e) const {
 }
 
 void Pointshell::order_edges() {
+  DisjointSets facets(static_cast<std::size_t>(surface_->triangles()));
   for (Index e = 0; e < surface_->edges(); ++e) {
     sticks_out_.push_back(turns_outwards(e));
-    if (sticks_out_.back()) edges_.push_back(e);
+    const auto around = surface_->edge_triangles(e);
+    if (sticks_out_.back())
+      edges_.push_back(e);
+    else if (around.size() == 2)
+      facets.join(around[0], around[1]);
   }
+  facets_ = facets.labels();
   if (edges_.empty()) return;
   group_by_eights(std::span(edges_), [&](Index e) {
     const auto& ends = surface_->edge(e).vertices;

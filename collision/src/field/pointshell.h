@@ -54,6 +54,8 @@ class Pointshell {
   Index edge(std::int32_t entry) const { return edges_[static_cast<std::size_t>(entry)]; }
   /// Whether the surface turns outwards at an edge at rest: others touch no edge.
   bool sticks_out(Index edge) const { return sticks_out_[static_cast<std::size_t>(edge)]; }
+  /// The part of the surface, between edges that stick out, that a triangle belongs to.
+  Index facet(Index triangle) const { return facets_[static_cast<std::size_t>(triangle)]; }
   std::size_t clusters() const { return sample_clusters_.count; }
   std::size_t bytes() const;  ///< of memory, the surface not counted
 
@@ -89,6 +91,7 @@ class Pointshell {
   std::vector<std::int32_t> slot_;    ///< of vertices: where x stands in the coordinates; −1: of no triangle
   std::vector<std::array<std::int32_t, 3>> corner_slots_;  ///< of triangles: those of its vertices
   std::vector<bool> sticks_out_;                           ///< of edges of the surface
+  std::vector<Index> facets_;                              ///< of triangles
   std::vector<Index> edges_;                               ///< by cluster; the last ones may be repeated
   std::vector<std::int32_t> edge_ends_;                    ///< see ShellView
   AlignedArray<float> rest_, U_;                           ///< U in tiles, see multiply_rows()
