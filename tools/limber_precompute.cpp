@@ -139,6 +139,8 @@ void precompute(Program& program, const PrecomputeArguments& a) {
   }
   if (a.mesh.empty() || a.output.empty()) throw InvalidArgument("MESH and --output are both needed; see --help");
   check_assembly(a);
+  EigenLauncher launcher;
+  if (a.slice.by_processes()) launcher = find_eigen_launcher();
   AskedBake asked = asked_bake(program, a);
   BakeOptions& options = asked.options;
   read_slices_of(program, a, program.options().count("--modes") > 0, options);
@@ -164,7 +166,7 @@ void precompute(Program& program, const PrecomputeArguments& a) {
   if (a.slice.bodies || a.slice.by_processes()) {
     const std::string bodies = bake_eigenproblems(input, options, program.warnings(), jobs);
     if (a.slice.bodies) return program.write_file(a.output, bodies);
-    slices = stopwatch.time("eigen", [&] { return run_limber_eigen(program, a, bodies); });
+    slices = stopwatch.time("eigen", [&] { return run_limber_eigen(launcher, program, a, bodies); });
     options.analysis.slices = read_slices(slices);
     if (!a.slice.band.empty()) {
       write_slices(program, a, std::move(options.analysis.slices));

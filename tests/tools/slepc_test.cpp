@@ -94,6 +94,26 @@ TEST_F(Engines, AgreeAboutTwoBodiesAndFixedNodes) {
   }
 }
 
+TEST_F(Engines, WithoutAFactorFindTheSameAndProveNothing) {
+  const std::vector<std::string> bar = {"bar.msh", "--material", "steel", "--modes", "8"};
+  const auto expected = report(bar)["frequencies_hz"].get<std::vector<double>>();
+  const Report r = report(bar, {"--engine", "lobpcg"});
+  ASSERT_TRUE(r.is_object());
+  EXPECT_FALSE(r["certified"]);
+  const auto found = r["frequencies_hz"].get<std::vector<double>>();
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], expected[i], 1e-9 * expected[i]) << i;
+}
+
+TEST_F(Engines, AreAskedForBeforeAnyWork) {
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", (folder / "").c_str(), 1);
+  const testing::ProgramResult r = run({"missing.msh", "--engine", "slepc", "-o", "a.glb"});
+  ::setenv("PATH", path.c_str(), 1);
+  EXPECT_NE(r.exit_code, 0);
+  EXPECT_THAT(r.err, HasSubstr("mpirun is not on PATH"));
+}
+
 TEST_F(Engines, SlicesOfBothSpanTheSameModesAndJoin) {
   const std::vector<std::string> bar = {"bar.msh", "--material", "steel"};
   const auto whole = report(bar, {"--modes", "30"})["frequencies_hz"].get<std::vector<double>>();

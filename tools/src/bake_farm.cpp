@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <list>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -19,6 +20,7 @@
 #include "limber/model/sha256.h"
 #include "precompute_report.h"
 #include "program.h"
+#include "slepc_engine.h"
 
 namespace limber::tools {
 namespace {
@@ -97,6 +99,8 @@ class Farm {
         results_(program, a.results),
         cache_(a.cache),
         program_hash_(sha256_hex(read_file("/proc/self/exe"))) {
+    if (const auto eigen = limber_eigen_file(); std::filesystem::exists(eigen))
+      program_hash_ += sha256_hex(read_file(eigen));
     if (arguments_.resume) done_ = read_results(a.results);
   }
 

@@ -39,13 +39,6 @@ fs::path on_path(const std::string& name) {
   throw InputError("--engine: " + name + " is not on PATH, expected Open MPI's (Debian: openmpi-bin)");
 }
 
-fs::path limber_eigen() {
-  const fs::path here = fs::read_symlink("/proc/self/exe").parent_path() / "limber-eigen";
-  if (fs::exists(here)) return here;
-  throw InputError("--engine: " + here.string() +
-                   " is missing: it is built where CMake finds MPI and SLEPc (scripts/install-dependencies --slepc)");
-}
-
 std::vector<std::string> arguments(const PrecomputeArguments& a, const fs::path& eigen, const fs::path& bodies,
                                    const fs::path& slices, const fs::path& report) {
   std::vector<std::string> list{"--quiet", "--oversubscribe", "-n", std::to_string(a.slice.processes)};
@@ -76,12 +69,21 @@ std::string words_of(const fs::path& errors) {
 
 }  // namespace
 
-std::string run_limber_eigen(Program& program, const PrecomputeArguments& a, const std::string& bodies) {
-  const fs::path mpirun = on_path("mpirun"), eigen = limber_eigen();
+fs::path limber_eigen_file() { return fs::read_symlink("/proc/self/exe").parent_path() / "limber-eigen"; }
+
+EigenLauncher find_eigen_launcher() {
+  const fs::path eigen = limber_eigen_file();
+  if (fs::exists(eigen)) return {on_path("mpirun"), eigen};
+  throw InputError("--engine: " + eigen.string() +
+                   " is missing: it is built where CMake finds MPI and SLEPc (scripts/install-dependencies --slepc)");
+}
+
+std::string run_limber_eigen(const EigenLauncher& launcher, Program& program, const PrecomputeArguments& a,
+                             const std::string& bodies) {
   const std::string slices = a.output + ".slices";
   const TemporaryFile stored{a.output + ".bodies"}, report{a.output + ".eigen.json"}, errors{a.output + ".errors"};
   limber::write_file(stored.path, bodies);
-  JobProcess job(mpirun, arguments(a, eigen, stored.path, slices, report.path), errors.path, {});
+  JobProcess job(launcher.mpirun, arguments(a, launcher.eigen, stored.path, slices, report.path), errors.path, {});
   const JobEnd end = wait_for(job);
   if (end.exit_code != 0 || end.signal != 0) {
     const std::string words = words_of(errors.path);
