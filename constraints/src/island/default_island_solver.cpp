@@ -1,5 +1,5 @@
 #include "../tuning.h"
-#include "convex_rounds.h"
+#include "augmented_lagrangian.h"
 #include "island_impl.h"
 #include "midpoint_newton.h"
 
@@ -17,7 +17,7 @@ class DefaultIslandSolver final : public IslandParts {
   void find_middle(IslandReport& done);
   void find_mean(IslandReport& done);
 
-  ConvexRounds rounds_;
+  AugmentedLagrangian rounds_;
   MidpointNewton mean_;
 };
 

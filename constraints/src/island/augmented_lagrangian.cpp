@@ -1,4 +1,4 @@
-#include "convex_rounds.h"
+#include "augmented_lagrangian.h"
 #include "../tuning.h"
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 namespace limber::internal {
 /// All rows as one convex problem, linear about the motion under the impulses at hand, again and again until these
 /// meet the rows' law at the true gaps: the method of multipliers, in which a row's spring yields from what it exerted.
-void ConvexRounds::solve(IslandStep& step, IslandReport& report) {
+void AugmentedLagrangian::solve(IslandStep& step, IslandReport& report) {
   place_units(step);
   fill_units(step);
   begin_units(step);
@@ -18,12 +18,12 @@ void ConvexRounds::solve(IslandStep& step, IslandReport& report) {
   iterate(step, report);
 }
 
-void ConvexRounds::take_again(IslandStep& step) {
+void AugmentedLagrangian::take_again(IslandStep& step) {
   take_impulses(step);
   step.predict();
 }
 
-void ConvexRounds::iterate(IslandStep& step, IslandReport& report) {
+void AugmentedLagrangian::iterate(IslandStep& step, IslandReport& report) {
   report.accepted = true;
   for (;; ++report.iterations) {
     take_impulses(step);
@@ -48,7 +48,7 @@ void ConvexRounds::iterate(IslandStep& step, IslandReport& report) {
 
 /// Where rounds end before the rows' law is met: contacts alone stay as the last round left them, and are accepted.
 /// What Newton's method left unsolved in the first of them is the motion that it found.
-void ConvexRounds::end_at_limit(IslandStep& step, IslandReport& report) {
+void AugmentedLagrangian::end_at_limit(IslandStep& step, IslandReport& report) {
   report.accepted = step.contacts_alone && report.iterations > 1;
   if (!step.contacts_alone) return take_best(step, report);
   if (report.accepted) return;
@@ -58,7 +58,7 @@ void ConvexRounds::end_at_limit(IslandStep& step, IslandReport& report) {
   report.change = largest_distance(step);
 }
 
-void ConvexRounds::take_best(IslandStep& step, IslandReport& report) {
+void AugmentedLagrangian::take_best(IslandStep& step, IslandReport& report) {
   if (!(report.change <= secants_.best())) {
     take_whole(secants_.best_iterate());
     take_impulses(step);
@@ -68,7 +68,7 @@ void ConvexRounds::take_best(IslandStep& step, IslandReport& report) {
 }
 
 /// Each contact a unit of its rows; what a body yields beyond its modes are further degrees of freedom of unit weight.
-void ConvexRounds::place_units(const IslandStep& step) {
+void AugmentedLagrangian::place_units(const IslandStep& step) {
   const IslandBodies& bodies = step.bodies;
   residual_.set(bodies, step.rows, step.length());
   contacts_.begin_structure();
@@ -87,7 +87,7 @@ void ConvexRounds::place_units(const IslandStep& step) {
 }
 
 /// J D^½ before the columns of what the bodies yield.
-void ConvexRounds::fill_rows(const IslandStep& step) {
+void AugmentedLagrangian::fill_rows(const IslandStep& step) {
   const IslandBodies& bodies = step.bodies;
   fill_values(step, [&](const ConstraintRows::Side&, Index local, std::size_t, double* to) {
     std::fill_n(to, static_cast<std::size_t>(bodies.response(local).size()), 0.0);
@@ -102,7 +102,7 @@ void ConvexRounds::fill_rows(const IslandStep& step) {
 }
 
 /// The rows, what they yield at first, and the columns of what the bodies do.
-void ConvexRounds::fill_units(const IslandStep& step) {
+void AugmentedLagrangian::fill_units(const IslandStep& step) {
   const IslandBodies& bodies = step.bodies;
   root_.resize(static_cast<std::size_t>(bodies.degrees_of_freedom()));
   bodies.write_position_metric(step.length(), 1.0, root_);
@@ -126,7 +126,7 @@ void ConvexRounds::fill_units(const IslandStep& step) {
 
 /// write(side, local, row, values) for each side of each row.
 template <class Write>
-void ConvexRounds::fill_values(const IslandStep& step, Write&& write) {
+void AugmentedLagrangian::fill_values(const IslandStep& step, Write&& write) {
   std::size_t next_side = 0, sides = 0;
   for (const Unit& unit : units_) {
     for (std::size_t r = 0; r < unit.rows; ++r) {
@@ -141,7 +141,7 @@ void ConvexRounds::fill_values(const IslandStep& step, Write&& write) {
 }
 
 /// From the motion without contacts; springs begin at the impulses of the last step.
-void ConvexRounds::begin_units(const IslandStep& step) {
+void AugmentedLagrangian::begin_units(const IslandStep& step) {
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
     const RowParameters& law = step.law(unit.first);
@@ -155,7 +155,7 @@ void ConvexRounds::begin_units(const IslandStep& step) {
 }
 
 /// f of the units' impulses, and the motion that they make in the problem.
-void ConvexRounds::take_impulses(IslandStep& step) {
+void AugmentedLagrangian::take_impulses(IslandStep& step) {
   for (std::size_t u = 0; u < units_.size(); ++u) {
     const Unit& unit = units_[u];
     contacts_.impulse(u) = unit.impulse;
@@ -166,8 +166,8 @@ void ConvexRounds::take_impulses(IslandStep& step) {
 
 /// The natural residual |F − P(F − u/ρ)| ρ, ρ what an impulse moves its own gap by: a distance, 0 where the impulse is
 /// the law's at the gap u.
-double ConvexRounds::distance_from_law(const Unit& unit, const RowParameters& law, const ContactPotential& potential,
-                                       Vec3 gap) {
+double AugmentedLagrangian::distance_from_law(const Unit& unit, const RowParameters& law,
+                                              const ContactPotential& potential, Vec3 gap) {
   ContactPotential natural = potential;
   natural.compliance = std::max(unit.response, std::numeric_limits<double>::min());
   if (law.compliance > 0.0) gap[0] += law.compliance * unit.impulse[0];
@@ -178,7 +178,7 @@ double ConvexRounds::distance_from_law(const Unit& unit, const RowParameters& la
 /// impulses, and what the springs exert there already.
 /// @return how far the impulses are from the rows' law at those gaps, and gaps from those of the last round, by
 /// tolerance
-ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool first_round) {
+AugmentedLagrangian::Distance AugmentedLagrangian::find_starts(const IslandStep& step, bool first_round) {
   Distance distance;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
@@ -200,7 +200,7 @@ ConvexRounds::Distance ConvexRounds::find_starts(const IslandStep& step, bool fi
 }
 
 /// Less what the rows ask for.
-Vec3 ConvexRounds::open_gap(const IslandStep& step, const Unit& unit) {
+Vec3 AugmentedLagrangian::open_gap(const IslandStep& step, const Unit& unit) {
   Vec3 open = Vec3::Zero();
   for (std::size_t r = 0; r < unit.rows; ++r)
     open[static_cast<int>(r)] =
@@ -209,7 +209,7 @@ Vec3 ConvexRounds::open_gap(const IslandStep& step, const Unit& unit) {
 }
 
 /// By tolerance, of the impulses at hand from the rows' law at the gaps as they are.
-double ConvexRounds::largest_distance(const IslandStep& step) {
+double AugmentedLagrangian::largest_distance(const IslandStep& step) {
   double largest = 0.0;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     const RowParameters& law = step.law(units_[u].first);
@@ -222,7 +222,7 @@ double ConvexRounds::largest_distance(const IslandStep& step) {
 
 /// Springs become stiffer where impulses changed by as much as in the round before, and by more than the law leaves
 /// them; beside joints, where secants follow such changes, where springs yielded by that.
-void ConvexRounds::stiffen(const IslandStep& step) {
+void AugmentedLagrangian::stiffen(const IslandStep& step) {
   constexpr const RoundsTuning& tuning = kConstraintsTuning.rounds;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Unit& unit = units_[u];
@@ -237,7 +237,7 @@ void ConvexRounds::stiffen(const IslandStep& step) {
 }
 
 /// The impulses of the next round: those found; beside joints with what secants tell of the rounds so far.
-void ConvexRounds::advance_units(const IslandStep& step) {
+void AugmentedLagrangian::advance_units(const IslandStep& step) {
   if (step.contacts_alone) {
     for (std::size_t u = 0; u < units_.size(); ++u) units_[u].impulse = units_[u].anchor = contacts_.impulse(u);
     return;
@@ -258,7 +258,7 @@ void ConvexRounds::advance_units(const IslandStep& step) {
 }
 
 /// Whole impulses by row, those nearest that rows may exert.
-void ConvexRounds::take_whole(std::span<const double> impulses) {
+void AugmentedLagrangian::take_whole(std::span<const double> impulses) {
   for (std::size_t u = 0; u < units_.size(); ++u) {
     Vec3 whole = Vec3::Zero();
     for (std::size_t r = 0; r < units_[u].rows; ++r) whole[static_cast<int>(r)] = impulses[units_[u].first + r];
@@ -267,7 +267,7 @@ void ConvexRounds::take_whole(std::span<const double> impulses) {
 }
 
 /// What the bodies yield beyond their modes, in a row's gap.
-double ConvexRounds::indentation_of(const IslandStep& step, std::size_t row) {
+double AugmentedLagrangian::indentation_of(const IslandStep& step, std::size_t row) {
   double sum = 0.0;
   step.for_bodies(row, [&](const ConstraintRows::Side&, Index local, bool) {
     const std::span<const double> columns = residual_.row(local, row);
@@ -279,7 +279,7 @@ double ConvexRounds::indentation_of(const IslandStep& step, std::size_t row) {
 }
 
 /// The motion found in place of that under the impulses found, which are not yet in balance with it.
-void ConvexRounds::take_motion(IslandStep& step) {
+void AugmentedLagrangian::take_motion(IslandStep& step) {
   const IslandBodies& bodies = step.bodies;
   step.loads.clear(bodies);
   for (Index local = 0; local < bodies.count(); ++local) {
@@ -297,7 +297,7 @@ void ConvexRounds::take_motion(IslandStep& step) {
   step.predict_under_loads();
 }
 
-void ConvexRounds::write_slip(const IslandStep& step, std::span<double> slip) const {
+void AugmentedLagrangian::write_slip(const IslandStep& step, std::span<double> slip) const {
   for (const Unit& unit : units_)
     if (step.law(unit.first).friction > 0.0 && unit.impulse[0] > 0.0) slip[unit.first] = unit.end.tail<2>().norm();
 }

@@ -13,7 +13,7 @@
 
 namespace limber::internal {
 
-class ConvexRounds {
+class AugmentedLagrangian {
  public:
   /// Finds step.f, with the step predicted and measured under it; how far that is from the law, and whether the step
   /// is to go on from it (IslandReport::change, accepted).
