@@ -167,6 +167,29 @@ TEST(Soundtrack, ABlockThatSlidesRubsUntilItRests) {
   EXPECT_LT(std::abs(track.samples.back()), 20e-6);
 }
 
+/// At 10 km/s twenty million roughnesses pass in a second; what they give together is what a bounded number gives.
+TEST(Soundtrack, FastSlidingCostsNoMoreThanOneHears) {
+  constexpr double kSpeed = 1e4;
+  const Scene scene = heard_scene(R"("step": 0.005, "steps": 4, "contact": {"friction": 0.5},
+    "statics": [{"name": "ground", "shape": {"half_space": {}}}],
+    "bodies": [{"name": "b", "asset": "block", "position": [0, 0, 0.5], "velocity": [10000, 0, 0]}])");
+  const auto assets = sounding_block();
+  const RunResult run = play_slide(scene, assets);
+  double contacts = 0.0, work = 0.0, energy = 0.0;
+  for (const ContactRecord& contact : run.trajectory.contacts) {
+    if (contact.phase != ContactPhase::kLasting) continue;
+    ++contacts, work += kSpeed * std::hypot(contact.impulse.x(), contact.impulse.y());
+  }
+  const ModalModelData& block = assets.at("block").bodies[0]->data();
+  for (const BlowRecord& blow : run.trajectory.blows) {
+    const Vec3 turned = block.inertia.inverse() * blow.point.cross(blow.impulse);
+    energy += 0.5 * (blow.impulse.squaredNorm() / block.mass + blow.point.cross(blow.impulse).dot(turned));
+  }
+  ASSERT_GT(contacts, 4.0);
+  EXPECT_NEAR(static_cast<double>(run.trajectory.blows.size()), contacts * kMostRoughnesses * scene.step, contacts);
+  EXPECT_NEAR(energy, kShareOfFriction * work, 0.15 * kShareOfFriction * work);
+}
+
 TEST(Soundtrack, ABlockThatRestsOrRidesOnABeltIsSilent) {
   const auto assets = sounding_block();
   for (const std::string belt : {"0", "1.5"}) {

@@ -54,7 +54,8 @@ std::vector<BakeJob> shard_of(std::vector<BakeJob> jobs, const std::string& text
 /// and those that its options name. Sorted.
 std::vector<std::filesystem::path> files_read_by(const BakeJob& job);
 
-/// What decides the bytes of the asset: contents of files, options, and the programs themselves (hashes of their files).
+/// What decides the bytes of the asset: contents of files, options, and the programs themselves (hashes of their
+/// files).
 std::string key_of(const BakeJob& job, const std::string& program_hash);
 
 /// Whether the asset is all that it writes.

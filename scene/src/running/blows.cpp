@@ -74,10 +74,11 @@ class StepOfBlows {
     const Vec3 along = friction / force;
     const double mass = mass_of(a, b, e.position, along);
     if (std::isinf(mass)) return;
-    const double deviation = std::sqrt(2.0 * mass * kShareOfFriction * force * kRoughness);
+    const double spacing = std::max(kRoughness, speed / kMostRoughnesses);
+    const double deviation = std::sqrt(2.0 * mass * kShareOfFriction * force * spacing);
     Dice dice(e.id, static_cast<std::uint64_t>(step));
-    const auto met = static_cast<int>(speed * length / kRoughness + dice.roll());
-    const double duration = duration_in_range(kRoughness / speed);
+    const auto met = static_cast<int>(speed * length / spacing + dice.roll());
+    const double duration = duration_in_range(spacing / speed);
     for (int i = 0; i < met; ++i) {
       const double time = (static_cast<double>(step) + (i + dice.roll()) / met) * length;
       const Vec3 impulse = std::sqrt(3.0) * (2.0 * dice.roll() - 1.0) * deviation * along;

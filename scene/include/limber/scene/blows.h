@@ -19,6 +19,8 @@ namespace limber {
 
 /// Between the roughnesses of a surface, along the way that a contact slides; m.
 inline constexpr double kRoughness = 5e-4;
+/// Roughnesses that pass faster than one can hear count as fewer and larger ones, 1/s: twice 20 kHz.
+inline constexpr double kMostRoughnesses = 4e4;
 /// Of the work of friction, what becomes vibration.
 inline constexpr double kShareOfFriction = 1e-3;
 
@@ -44,11 +46,12 @@ void list_blows(const Scene& scene, const ScenePlayer& player, std::span<const B
                 std::span<const std::size_t> number_of, std::vector<BlowRecord>& blows);
 
 /// Appends the noise of friction of the step that `player` took last: a contact that lasts and slides at speed v under
-/// the friction f meets v/d roughnesses a second, of distance d = kRoughness. Each is a blow on both bodies along f, of
-/// the duration d/v and the impulse J = √(2 m η f d) times a number of mean 0 and variance 1, even between ±√3: it
-/// gives the mass m that the contact feels along f the share η = kShareOfFriction of the work f d. So the power of the
-/// noise follows that of friction, f v, and its highest frequency v/d follows the speed [van den Doel, Kry and Pai,
-/// FoleyAutomatic, 2001]. Numbers come from the contact and the step: the same whenever it is played.
+/// the friction f meets v/d roughnesses a second, of distance d = max(kRoughness, v/kMostRoughnesses). Each is a blow
+/// on both bodies along f, of the duration d/v and the impulse J = √(2 m η f d) times a number of mean 0 and variance
+/// 1, even between ±√3: it gives the mass m that the contact feels along f the share η = kShareOfFriction of the work f
+/// d. So the power of the noise follows that of friction, f v, and its highest frequency v/d follows the speed [van den
+/// Doel, Kry and Pai, FoleyAutomatic, 2001]. Numbers come from the contact and the step: the same whenever it is
+/// played.
 /// @param bodies, number_of as for list_blows(); of the scene's static i, bodies.size() + i
 void list_slides(const Scene& scene, const ScenePlayer& player, std::span<const BodyId> bodies,
                  std::span<const std::size_t> number_of, std::vector<BlowRecord>& blows);
