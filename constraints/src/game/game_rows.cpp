@@ -95,8 +95,13 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
     const Vec3 shift = body.root_mass > 0.0 ? Vec3(length_ / body.root_mass * body.goes) : Vec3(Vec3::Zero());
     const Mat3 turn = length_ * body.turn_scale;
     double* to = &numbers_[side.at];
+    Pull pull;
     for (std::size_t i = 0; i < group.count; ++i, to += side.coordinates) {
       const ConstraintRows::Side& from = made_.row(static_cast<Index>(i)).sides[s];
+      const GameRow& row = rows_[group.first + i];
+      pull.force += (closing ? row.closing : row.force) * from.linear;
+      pull.arm += from.linear.cross(from.angular);  // across each direction: r again in all but one
+      pull.directions += from.linear.squaredNorm();
       Eigen::Map<Vec3>{to} = shift.cwiseProduct(from.linear);
       Eigen::Map<Vec3>{to + 3}.noalias() = turn * from.angular;
       if (body.modes != nullptr) {
@@ -107,34 +112,20 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
       }
       if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
     }
-    closing ? resist(body, group, s) : stiffen(body, group, s);
+    if (!(pull.directions > 1.5)) continue;
+    pull.arm /= pull.directions - 1.0;
+    closing ? resist(body, pull, scales_[static_cast<std::size_t>(side.frame)])
+            : stiffen(body, pull, scales_[static_cast<std::size_t>(side.frame)]);
   }
-}
-
-template <class Force>
-GameRows::Pull GameRows::pull(const GameGroup& group, std::size_t s, const Force& force) const {
-  Pull sum;
-  double directions = 0.0;
-  for (std::size_t i = 0; i < group.count; ++i) {
-    const ConstraintRows::Side& row = made_.row(static_cast<Index>(i)).sides[s];
-    sum.force += force(rows_[group.first + i]) * row.linear;
-    sum.arm += row.linear.cross(row.angular);  // across each direction: r again in all but one
-    directions += row.linear.squaredNorm();
-  }
-  if (!(directions > 1.5)) return {};
-  sum.arm /= directions - 1.0;
-  return sum;
 }
 
 /// A force F at an arm r that pulls outward turns a body back by k = r·F (1 − f fᵀ), f its direction. In units of the
 /// body's inertia, about the axes of its coordinates.
-void GameRows::stiffen(const GameBody& body, const GameGroup& group, std::size_t s) {
-  const Pull at = pull(group, s, [](const GameRow& row) { return row.force; });
+void GameRows::stiffen(const GameBody& body, const Pull& at, Turns& stiffness) {
   const double outward = at.force.dot(at.arm);
   if (!(outward > 0.0)) return;
   const Vec3 along = body.turn_scale * at.force;
   const double by = 1.0 / at.force.squaredNorm();
-  Turns& stiffness = scales_[static_cast<std::size_t>(group.sides[s].frame)];
   for (int axis = 0; axis < 3; ++axis)
     stiffness[static_cast<std::size_t>(axis)] +=
         outward * std::max(0.0, body.turn_scale.row(axis).squaredNorm() - by * along[axis] * along[axis]);
@@ -142,10 +133,8 @@ void GameRows::stiffen(const GameBody& body, const GameGroup& group, std::size_t
 
 /// The second derivative of the gaps times their forces, by a turn, is r·F 1 − ½(r Fᵀ + F rᵀ): no more than |r| |F| in
 /// any direction.
-void GameRows::resist(const GameBody& body, const GameGroup& group, std::size_t s) {
-  const Pull at = pull(group, s, [](const GameRow& row) { return row.closing; });
+void GameRows::resist(const GameBody& body, const Pull& at, Turns& stiffness) {
   const double most = at.force.norm() * at.arm.norm();
-  Turns& stiffness = scales_[static_cast<std::size_t>(group.sides[s].frame)];
   for (int axis = 0; axis < 3; ++axis)
     stiffness[static_cast<std::size_t>(axis)] += 4.0 * most * body.turn_scale.row(axis).squaredNorm();
 }

@@ -107,12 +107,11 @@ class GameRows {
   void write_sides(const GameBodies& bodies, const GameGroup& group, bool closing);
   /// Of one side of the rows at hand: what their forces pull with, and where they act from the body's origin, world.
   struct Pull {
-    Vec3 force = Vec3::Zero(), arm = Vec3::Zero();  // zero where they hold less than two directions
+    Vec3 force = Vec3::Zero(), arm = Vec3::Zero();
+    double directions = 0.0;  // of less than two the arm is not known
   };
-  template <class Force>
-  Pull pull(const GameGroup& group, std::size_t s, const Force& force) const;
-  void stiffen(const GameBody& body, const GameGroup& group, std::size_t s);
-  void resist(const GameBody& body, const GameGroup& group, std::size_t s);
+  static void stiffen(const GameBody& body, const Pull& at, Turns& stiffness);
+  static void resist(const GameBody& body, const Pull& at, Turns& stiffness);
   void write_row(const GameBodies& bodies, const GameGroup& group, std::size_t i);
   void hold(const GameGroup& group, double step);
   void scale_turns();
