@@ -304,7 +304,8 @@ void JointConstraint::measure_along(const Instant& at, const Direction& along, F
 }
 
 void JointConstraint::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
-  const Instant at = instant(states, when);
+  Instant at = instant(states, when);
+  if (when != StepTime::kMiddle) at.a.find_turning(), at.b.find_turning();
   if (when == StepTime::kStart) {
     step_ = step;
     axes_at_start_ = at.a.axes;

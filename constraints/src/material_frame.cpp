@@ -70,10 +70,12 @@ SkinInfluences mean_influences(const ModalModel& model, std::span<const Weighted
   return skin_influences(weights);
 }
 
+/// Sums apart: in a vector in memory each would wait for the one before.
 Vec3 times(const std::vector<Vec3>& shapes, std::span<const double> z) {
-  Vec3 u = Vec3::Zero();
-  for (std::size_t i = 0; i < shapes.size(); ++i) u += z[i] * shapes[i];
-  return u;
+  double u = 0.0, v = 0.0, w = 0.0;
+  for (std::size_t i = 0; i < shapes.size(); ++i)
+    u += z[i] * shapes[i][0], v += z[i] * shapes[i][1], w += z[i] * shapes[i][2];
+  return {u, v, w};
 }
 
 /// By its vector r: cos ½|r| and the factor of r in the vector part of its quaternion, sin(½|r|)/|r|.
@@ -204,11 +206,7 @@ std::span<const Vec3> MaterialFrame::displacements(const BodyStates& states, std
   return room;
 }
 
-Vec3 MaterialFrame::turn(std::span<const double> z) const {
-  Vec3 theta = Vec3::Zero();
-  for (std::size_t i = 0; i < rotation_.size(); ++i) theta += z[i] * rotation_[i];
-  return theta;
-}
+Vec3 MaterialFrame::turn(std::span<const double> z) const { return times(rotation_, z); }
 
 Vec3 MaterialFrame::position(const BodyStates& states, StepTime when) const {
   if (when == StepTime::kMiddle) return 0.5 * (position(states, StepTime::kStart) + position(states, StepTime::kEnd));
@@ -256,7 +254,6 @@ FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
   bend.axes_B = rest_.axes;
   if (!rotation_.empty()) {
     bend.turned = turn(z);
-    bend.turning = turning_between(bend.turned, bend.turned);
     bend.axes_B = rotation_by(bend.turned) * rest_.axes;
   }
   at.axes = R * bend.axes_B;
@@ -278,6 +275,10 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
   return at;
 }
 
+void FrameInstant::find_turning() {
+  if (bend) bend->turning = turning_between(bend->turned, bend->turned);
+}
+
 void FrameInstant::bend_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
   to.shift_B += bend->R_BW * n;
   to.turn_B += bend->R_BW * (p - position).cross(n);
@@ -293,12 +294,11 @@ void FrameInstant::add_turn(const Vec3& a, FrameMeasure& to) const {
 }
 
 void MaterialFrame::write_modal(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const {
-  modal.assign(displacement_.size(), 0.0);
-  if (anchors_.empty())
-    for (std::size_t i = 0; i < modal.size(); ++i) modal[i] = displacement_[i].dot(measure.shift_B);
-  else if (!measure.shift_B.isZero(0.0))
-    add_rows(at.states, at.when, measure.shift_B, modal);
-  for (std::size_t i = 0; i < rotation_.size(); ++i) modal[i] += rotation_[i].dot(measure.turn_B);
+  modal.resize(displacement_.size());
+  const Vec3 shift = anchors_.empty() ? measure.shift_B : Vec3(Vec3::Zero()), turn = measure.turn_B;
+  for (std::size_t i = 0; i < modal.size(); ++i)
+    modal[i] = displacement_[i].dot(shift) + (rotation_.empty() ? 0.0 : rotation_[i].dot(turn));
+  if (!anchors_.empty() && !measure.shift_B.isZero(0.0)) add_rows(at.states, at.when, measure.shift_B, modal);
 }
 
 std::vector<SurfacePoint> patch_around(const ModalModel& model, SurfacePoint::Surface surface, const Vec3& center,

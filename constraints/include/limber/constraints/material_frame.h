@@ -36,7 +36,8 @@ struct FrameInstant {
   /// What counts where modes show, in body axes.
   struct Bend {
     Mat3 R_BW, axes_B;  ///< R_BW: in the middle R'ᵀ (BodyStates)
-    /// What the axes turn by per unit of Θ dz; in the middle the Cayley vector of all of it, of Θ Δz.
+    /// What the axes turn by per unit of Θ dz, once find_turning() has been called at one of the step's ends; in the
+    /// middle the Cayley vector of all of it, of Θ Δz.
     Mat3 turning = Mat3::Identity();
     Vec3 turned = Vec3::Zero();  ///< Θ z, at the step's ends
   };
@@ -48,6 +49,8 @@ struct FrameInstant {
   Vec3 origin = Vec3::Zero();    ///< of the body, world, m
   std::optional<Bend> bend{};
 
+  /// Before add_axis() and add_turn(), at one of the step's ends.
+  void find_turning();
   /// Adds the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
   /// @param p, n world
   void add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
