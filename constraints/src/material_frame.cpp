@@ -236,28 +236,32 @@ Vec3 MaterialFrame::turn(const BodyStates& states) const {
 }
 
 FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
-  if (when == StepTime::kMiddle) return between(at(states, StepTime::kStart), at(states, StepTime::kEnd));
-  FrameInstant at{.states = states, .when = when, .body = body_, .position = rest_.origin, .axes = rest_.axes};
-  if (body_ < 0) return at;
-  const RigidTransform& pose = states.pose(body_, when);
-  const Mat3 R = to_matrix(pose.q);
-  at.origin = pose.p;
-  if (displacement_.empty()) {
-    at.position = pose.p + R * rest_.origin;
-    at.axes = R * rest_.axes;
+  // Apart, so that it is made where it is wanted: it is never moved.
+  const auto at_end = [&] {
+    FrameInstant at{.states = states, .when = when, .body = body_, .position = rest_.origin, .axes = rest_.axes};
+    if (body_ < 0) return at;
+    const RigidTransform& pose = states.pose(body_, when);
+    const Mat3 R = to_matrix(pose.q);
+    at.origin = pose.p;
+    if (displacement_.empty()) {
+      at.position = pose.p + R * rest_.origin;
+      at.axes = R * rest_.axes;
+      return at;
+    }
+    const std::span<const double> z = states.amplitudes(body_, when);
+    at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
+    FrameInstant::Bend& bend = at.bend.emplace();
+    bend.R_BW = R.transpose();
+    bend.axes_B = rest_.axes;
+    if (!rotation_.empty()) {
+      bend.turned = turn(z);
+      bend.axes_B = rotation_by(bend.turned) * rest_.axes;
+    }
+    at.axes = R * bend.axes_B;
     return at;
-  }
-  const std::span<const double> z = states.amplitudes(body_, when);
-  at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
-  FrameInstant::Bend& bend = at.bend.emplace();
-  bend.R_BW = R.transpose();
-  bend.axes_B = rest_.axes;
-  if (!rotation_.empty()) {
-    bend.turned = turn(z);
-    bend.axes_B = rotation_by(bend.turned) * rest_.axes;
-  }
-  at.axes = R * bend.axes_B;
-  return at;
+  };
+  if (when == StepTime::kMiddle) return between(at(states, StepTime::kStart), at(states, StepTime::kEnd));
+  return at_end();
 }
 
 FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstant& end) const {
