@@ -250,9 +250,8 @@ FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
     }
     const std::span<const double> z = states.amplitudes(body_, when);
     at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
-    FrameInstant::Bend& bend = at.bend.emplace();
-    bend.R_BW = R.transpose();
-    bend.axes_B = rest_.axes;
+    // Named for clang, to which a nested class has no default constructor within the class about it.
+    FrameInstant::Bend& bend = at.bend.emplace(FrameInstant::Bend{.R_BW = R.transpose(), .axes_B = rest_.axes});
     if (!rotation_.empty()) {
       bend.turned = turn(z);
       bend.axes_B = rotation_by(bend.turned) * rest_.axes;
@@ -272,10 +271,9 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
                   .axes = 0.5 * (start.axes + end.axes),
                   .origin = 0.5 * (start.origin + end.origin)};
   if (!start.bend) return at;
-  FrameInstant::Bend& bend = at.bend.emplace();
-  bend.R_BW = start.bend->R_BW - 0.5 * start.bend->R_BW * cross_matrix(at.states.turn(body_));
-  bend.axes_B = 0.5 * (start.bend->axes_B + end.bend->axes_B);
-  if (!rotation_.empty()) bend.turning = turning_between(start.bend->turned, end.bend->turned);
+  const Mat3 R_BW = start.bend->R_BW - 0.5 * start.bend->R_BW * cross_matrix(at.states.turn(body_));
+  at.bend.emplace(FrameInstant::Bend{.R_BW = R_BW, .axes_B = 0.5 * (start.bend->axes_B + end.bend->axes_B)});
+  if (!rotation_.empty()) at.bend->turning = turning_between(start.bend->turned, end.bend->turned);
   return at;
 }
 
