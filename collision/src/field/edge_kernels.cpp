@@ -272,10 +272,10 @@ HWY_ATTR bool FirstExit(const FieldQuery& query, const float* from, const float*
     const F along = hn::MulAdd(hn::Iota(d, 0.0f), All(part), All(start));
     hn::StoreU(DistanceOf(query.field, ways.Rest(along)).value, d, values + 1);
   };
-  // The first of them between which and the next one the sign changes; kLanes + 1: none.
+  // The first of them between which and the next one the sign changes; kLanes: none.
   const auto change = [&](std::size_t first) {
     while (first < kLanes && (values[first] < 0.0f) == (values[first + 1] < 0.0f)) ++first;
-    return first < kLanes ? first : kLanes + 1;
+    return first;
   };
   const float length = hn::GetLane(ways.Length());
   const int points = std::clamp(static_cast<int>(length / step) + 2, 2, 96);
@@ -283,7 +283,7 @@ HWY_ATTR bool FirstExit(const FieldQuery& query, const float* from, const float*
   for (int first = 0; first < points; first += static_cast<int>(kLanes)) {
     look(part * static_cast<float>(first), part);
     const std::size_t i = change(first == 0 ? 1 : 0);
-    if (i <= kLanes) {
+    if (i < kLanes) {
       const float start = part * (static_cast<float>(first + static_cast<int>(i)) - 1.0f), before = values[i];
       look(start + eighth, eighth);
       values[0] = before;

@@ -120,11 +120,14 @@ FoundSide on_foot(const SurfaceFoothold& foot) {
 
 Index& PatchExits::sample_of(Index vertex) { return sample_of_[static_cast<std::size_t>(vertex)]; }
 
+bool PatchExits::leaves(const Vec3f& from, const Vec3f& to, FieldHit& exit) const {
+  return first_exit(query_, from.data(), to.data(), static_cast<float>(view_.other->shell().cell()), exit);
+}
+
 // How far along a line from a point inside the surface ends, as a part of it.
 float PatchExits::part_inside(const Vec3f& from, const Vec3f& to) const {
   FieldHit exit;
-  const auto step = static_cast<float>(view_.other->shell().cell());
-  return first_exit(query_, from.data(), to.data(), step, exit) ? exit.along : 1.0f;
+  return leaves(from, to, exit) ? exit.along : 1.0f;
 }
 
 // The part of a triangle's area vector that is inside, shared by its corners that are; other's frame.
@@ -289,9 +292,7 @@ void FieldContacts::leave_by_patches(const FieldView& view) {
     const DeformedPointshell& other = *view.other;
     const Vec3f far = sample.at + (other.high() - other.low()).norm() * way;
     FieldHit exit;
-    FieldQuery query = view.query;
-    set_frame(query, Eigen::Matrix3f::Identity(), Vec3f::Zero());
-    if (!first_exit(query, sample.at.data(), far.data(), static_cast<float>(other.shell().cell()), exit)) continue;
+    if (!patches_.leaves(sample.at, far, exit)) continue;
     const Pierced through = walk_to_face(other, other.shell().triangle_near(exit), sample.at, far);
     if (through.triangle < 0 || !(through.along > 0.0f && through.along <= 1.0f)) continue;
     const Vec3f point = sample.at + through.along * (far - sample.at);

@@ -84,6 +84,8 @@ class PatchExits {
   const Vec3f& way(std::size_t sample) {
     return patches_[static_cast<std::size_t>(joined_.root(static_cast<Index>(sample)))].way;
   }
+  /// first_exit() of points in the field's frame.
+  bool leaves(const Vec3f& from, const Vec3f& to, FieldHit& exit) const;
 
  private:
   struct Patch {

@@ -132,15 +132,6 @@ bool lies_in_front(const DeformedPointshell& body, Index v, const Vec3f& n, floa
   });
 }
 
-Vec3f area_vector(const DeformedPointshell& body, Index v) {
-  Vec3f sum = Vec3f::Zero();
-  for (const Index t : body.shell().surface().vertex_triangles(v)) {
-    const TrianglePointsf x = corners_of(body, t);
-    sum += (x[1] - x[0]).cross(x[2] - x[0]) / 6.0f;
-  }
-  return sum;
-}
-
 FeatureKey key_of(const CollisionSurface& surface, const SurfaceFoothold& foot) {
   if (foot.corners == kFootOnFace) return feature_key(Feature::Kind::kFace, foot.triangle);
   if (std::has_single_bit(foot.corners))

@@ -51,9 +51,6 @@ Pierced walk_to_face(const DeformedPointshell& body, Index start, const Vec3f& f
 /// Whether the surface about a vertex lies in front of it along a unit direction, leaning back by no more than a sine.
 bool lies_in_front(const DeformedPointshell& body, Index v, const Vec3f& n, float leaning);
 
-/// Sum of a third of the area vectors of the triangles at a vertex, outwards, m².
-Vec3f area_vector(const DeformedPointshell& body, Index v);
-
 /// Visits the edge that a foot lies on, or those of the vertex that it is; none of a face.
 template <class Visit>
 void for_edges_at(const CollisionSurface& surface, const SurfaceFoothold& foot, const Visit& visit) {
