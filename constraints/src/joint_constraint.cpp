@@ -235,15 +235,13 @@ Vec3 JointConstraint::direction_change(const Instant& at, const RowPlan& row, co
 /// In the middle of the step an angle φ about an axis that both parts share changes by its direction times the relative
 /// turn up to a factor: with Cayley vectors α of a and ρ of b against a, along the axis, |ρ| = 2 tan ½Δφ,
 ///   τ_b − τ_a = (1 + ¼α²)/(1 − ¼α·ρ) (1 − ½[α])⁻¹ρ,      (1 − ½[α])⁻¹ × the axis at the start = its mean
-JointConstraint::Direction JointConstraint::mean_direction(const BodyStates& states, const Instant& at,
-                                                           const RowPlan& row) const {
+JointConstraint::Direction JointConstraint::mean_direction(const Instant& start, const Instant& end, const Instant& at,
+                                                           const RowPlan& row, const Vec3& turn) const {
   Direction mean = direction(at, row);
   const bool turns = row.measure == Measure::kScrew || row.measure == Measure::kAngle;
   if (!turns || spec_.type == JointType::kBall) return mean;
   const int angle = row.measure == Measure::kScrew ? 0 : row.coordinate;
-  const Instant start = instant(states, StepTime::kStart), end = instant(states, StepTime::kEnd);
   const double half = 0.5 * (unwrapped(end, angle) - unwrapped(start, angle));
-  const Vec3 turn = a_.turn(states);
   const Vec3 axis = start.a.axes.col(row.axis), mean_axis = at.a.axes.col(row.axis);
   const double tangent = std::tan(half), ratio = half == 0.0 ? 1.0 : half / tangent;
   mean.angular *=
@@ -304,8 +302,9 @@ void JointConstraint::measure_along(const Instant& at, const Direction& along, F
 }
 
 void JointConstraint::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
+  if (when == StepTime::kMiddle) return add_mean_rows(states, rows);
   Instant at = instant(states, when);
-  if (when != StepTime::kMiddle) at.a.find_turning(), at.b.find_turning();
+  at.a.find_turning(), at.b.find_turning();
   if (when == StepTime::kStart) {
     step_ = step;
     axes_at_start_ = at.a.axes;
@@ -317,16 +316,26 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const RowPlan& plan = rows_[i];
     FrameMeasure of_a, of_b;
-    if (!measure_straight(at, plan, of_a, of_b))
-      measure_along(at, when == StepTime::kMiddle ? mean_direction(states, at, plan) : direction(at, plan), of_a, of_b);
+    if (!measure_straight(at, plan, of_a, of_b)) measure_along(at, direction(at, plan), of_a, of_b);
     RowParameters& law = rows.row(rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_))).law;
-    if (when == StepTime::kMiddle) continue;
     const bool distance = is_distance(plan);
     const double gap = this->gap(at, plan);
     write_law(plan, gap, law);
     law.tolerance = distance ? nearest : internal::kConstraintsTuning.rows.joint_tolerance;
     law.digits = distance ? place_digits : digits_of(1.0 + std::abs(gap));
     if (i < force_.plan.size()) law.last_force = force_.plan[i];
+  }
+}
+
+/// What the rows are to be met by is told at the step's start.
+void JointConstraint::add_mean_rows(const BodyStates& states, ConstraintRows& rows) {
+  const Instant start = instant(states, StepTime::kStart), end = instant(states, StepTime::kEnd),
+                at{.a = a_.between(start.a, end.a), .b = b_.between(start.b, end.b)};
+  for (const RowPlan& plan : rows_) {
+    FrameMeasure of_a, of_b;
+    if (!measure_straight(at, plan, of_a, of_b))
+      measure_along(at, mean_direction(start, end, at, plan, a_.turn(states)), of_a, of_b);
+    rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_));
   }
 }
 

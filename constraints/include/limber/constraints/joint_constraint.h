@@ -112,7 +112,8 @@ class JointConstraint final : public Constraint {
   double gap(const Instant& at, const RowPlan& row) const;
   Direction direction(const Instant& at, const RowPlan& row) const;
   Vec3 direction_change(const Instant& at, const RowPlan& row, const Mat3& dR_a, const Mat3& dR_b) const;
-  Direction mean_direction(const BodyStates& states, const Instant& at, const RowPlan& row) const;
+  Direction mean_direction(const Instant& start, const Instant& end, const Instant& at, const RowPlan& row,
+                           const Vec3& turn) const;
   int axis_of(int coordinate) const;
   int turning_axis() const { return spec_.type == JointType::kPlanar ? 2 : 0; }  // of what turns about one alone
   static bool is_distance(const RowPlan& row) {
@@ -126,6 +127,7 @@ class JointConstraint final : public Constraint {
   void plan_locked_rows();
   void plan_limits();
   void plan_actuation();
+  void add_mean_rows(const BodyStates& states, ConstraintRows& rows);
   bool measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a, FrameMeasure& of_b) const;
   static void measure_along(const Instant& at, const Direction& along, FrameMeasure& of_a, FrameMeasure& of_b);
   void write_law(const RowPlan& plan, double gap, RowParameters& law) const;
