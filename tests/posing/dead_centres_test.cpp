@@ -243,5 +243,48 @@ TEST(DeadCentres, AHandOutOfReachIsToldAndTheArmIsStraight) {
   EXPECT_EQ(session.solve().status, PoseResult::Status::kLocalMinimum);
 }
 
+/// Iterations of the first frame of a drag that begins beyond reach, and of all that follow.
+std::pair<int, int> iterations_beyond_reach(const Reach& reach, int starts) {
+  PosingSession session(reach.model, {.starts = starts});
+  session.set_pinned(0, true);
+  const PoseHandle hand = session.add_handle(reach.part, reach.grip);
+  std::pair<int, int> out;
+  for (int i = 0; i < 15; ++i) {
+    session.move_handle(hand, {50 + 0.1 * i, 20, 10});
+    const PoseResult r = session.solve();
+    EXPECT_EQ(r.status, PoseResult::Status::kLocalMinimum);
+    (i == 0 ? out.first : out.second) += r.iterations;
+  }
+  return out;
+}
+
+// The hand of an arm fifty lengths away cannot be met a tenth of a length further on either.
+TEST(DeadCentres, ADragBeyondReachTriesOtherStartsOnce) {
+  std::mt19937 random(3);
+  const Reach reach = random_arm(random, true, false);
+  const auto [first, others] = iterations_beyond_reach(reach, 16);
+  const auto [first_alone, others_alone] = iterations_beyond_reach(reach, 0);
+  EXPECT_GT(first, 3 * first_alone);
+  EXPECT_LT(others, 2 * others_alone);
+}
+
+TEST(DeadCentres, ArmsReachFromWhereTheyWerePulledInVain) {
+  std::mt19937 random(1);
+  int met = 0;
+  const int arms = trials(15);
+  for (int i = 0; i < arms; ++i) {
+    const Reach reach = random_arm(random, i % 2 == 0, true);
+    PosingSession session(reach.model);
+    session.set_pinned(0, true);
+    const PoseHandle hand = session.add_handle(reach.part, reach.grip);
+    for (const Vec3& target : {Vec3(50, 20, 10), reach.target}) {
+      session.move_handle(hand, target);
+      const PoseResult r = session.solve();
+      if (target == reach.target) met += r.handle_error < 1e-6 * size_of(reach.model);
+    }
+  }
+  EXPECT_GE(met, 0.999 * arms);
+}
+
 }  // namespace
 }  // namespace limber

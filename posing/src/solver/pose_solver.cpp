@@ -423,26 +423,40 @@ bool PoseSolver::is_sure(const Pose& pose, double value) const {
   return !misses(pose, value) && (factor_.whole || handle_error(pose) <= options_.tolerance * structure_->size);
 }
 
+/// Whether starts that were tried in vain tell that these targets are beyond reach, too: the root of twice the least
+/// energy is a distance from what can be reached, and changes by no more than the targets move.
+bool PoseSolver::is_beyond_reach() const {
+  double moved = 0.0;
+  for (std::size_t i = 0; i < missed_.targets.size(); ++i)
+    moved += handles_[i].weight * (handles_[i].target - missed_.targets[i]).squaredNorm();
+  return 0.5 * moved < missed_.energy;
+}
+
 /// Steps from the pose at hand; where these leave a handle away although nothing is strained, steps from other poses
 /// that joints allow, those of the lowest energy first, until a handle is met.
 PoseResult PoseSolver::solve(Pose& pose) {
   using Status = PoseResult::Status;
   PoseResult result = descend(pose, options_.max_iterations);
-  if (result.status == Status::kInfeasible || options_.starts == 0 || !misses(pose, result.energy)) return result;
+  if (result.status == Status::kInfeasible || options_.starts == 0 || !misses(pose, result.energy) || is_beyond_reach())
+    return result;
   const PoseStarts starts(*structure_);
   std::vector<std::pair<double, int>> order;
   for (int i = 1; i <= kStartsToChooseFrom * options_.starts; ++i) order.emplace_back(energy(starts.start(pose, i)), i);
   std::sort(order.begin(), order.end());
+  double least = result.energy;
   int left = options_.max_iterations;
   for (int i = 0; i < options_.starts && left > 0; ++i) {
     Pose trial = starts.start(pose, order[static_cast<std::size_t>(i)].second);
     PoseResult tried = descend(trial, left);
     result.iterations += tried.iterations, left -= tried.iterations;
+    least = std::min(least, tried.energy);
     if (tried.status != Status::kConverged || misses(trial, tried.energy)) continue;
     tried.iterations = result.iterations, tried.initial_energy = result.initial_energy;
     pose = std::move(trial);
     return tried;
   }
+  missed_ = {.targets = {}, .energy = least};
+  for (const HandleTerm& h : handles_) missed_.targets.push_back(h.target);
   factor_.age = kAnew;  // the matrix is of another pose
   return result;
 }

@@ -84,6 +84,7 @@ class PoseSolver {
   double handle_error(const Pose& pose) const;
   bool misses(const Pose& pose, double value) const;
   bool is_sure(const Pose& pose, double value) const;
+  bool is_beyond_reach() const;
   struct Moments {
     std::vector<Mat3> all{};
     std::vector<double> most{};
@@ -119,6 +120,10 @@ class PoseSolver {
     VectorX moved{}, residual{}, plain{};  // moved: empty if the next step is no continuation of it
     std::vector<bool> held{};              // rows
   } last_;
+  struct {
+    std::vector<Vec3> targets{};  // of handles; empty: none
+    double energy = 0.0;          // the least of all starts
+  } missed_;                      // where starts were tried last in vain
 };
 
 }  // namespace limber::internal
