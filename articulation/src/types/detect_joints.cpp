@@ -6,9 +6,15 @@
 #include "limber/core/error.h"
 #include "number_text.h"
 #include "tuning.h"
+#include "types/common_line.h"
+#include "types/mechanism.h"
+#include "types/other_hypotheses.h"
 
 namespace limber {
 namespace {
+
+using internal::Bend;
+using internal::PairOfParts;
 
 /// Contacts' share of the time, as progress tells it.
 constexpr double kContactsShare = 0.9;
@@ -41,19 +47,59 @@ std::string contact_in_words(const std::vector<ContactRegion>& regions) {
          internal::number_text(gap, 3);
 }
 
-DetectedJoint joint_of(const std::vector<ContactRegion>& regions, const SlippageOptions& options) {
-  const Slippage slippage = analyse_slippage(regions, options);
+/// The line along a flat contact's normal about which surfaces of both parts near it turn into themselves.
+void look_for_line(const Assembly& assembly, const std::vector<std::vector<Bend>>& bends, PairOfParts& pair) {
+  const JointHypothesis& first = pair.slippage.hypotheses.front();
+  const auto a = static_cast<std::size_t>(pair.a()), b = static_cast<std::size_t>(pair.b());
+  const double size = std::min(assembly.components[a].diagonal, assembly.components[b].diagonal);
+  const auto point = internal::common_line(bends[a], bends[b], first.joint.frame.axes.col(2), first.joint.frame.origin,
+                                           internal::tuning().types.line.near * size);
+  if (point) internal::add_hypothesis_of_line(*point, pair.slippage);
+}
+
+bool is_flat(const PairOfParts& pair) { return pair.slippage.hypotheses.front().joint.type == JointType::kPlanar; }
+
+/// Bends of the components that a flat contact asks for; of the others none.
+std::vector<std::vector<Bend>> bends_at_flat_contacts(const Assembly& assembly, const std::vector<PairOfParts>& pairs,
+                                                      double crease_angle, Jobs& jobs) {
+  std::vector<bool> asked(assembly.components.size(), false);
+  for (const PairOfParts& pair : pairs)
+    if (is_flat(pair)) asked[static_cast<std::size_t>(pair.a())] = asked[static_cast<std::size_t>(pair.b())] = true;
+  std::vector<std::vector<Bend>> out(asked.size());
+  jobs.parallel_for(out.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c)
+      if (asked[c]) out[c] = internal::bends_of(assembly.components[c].surface, crease_angle);
+  });
+  return out;
+}
+
+/// Hypotheses of all pairs: of each contact, then with what is around it, then of all together.
+void analyse(const Assembly& assembly, const DetectionOptions& options, Jobs& jobs, std::vector<PairOfParts>& pairs) {
+  jobs.parallel_for(pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) pairs[i].slippage = analyse_slippage(pairs[i].regions, options.slippage);
+  });
+  if (options.slippage.method == SlippageMethod::kFixedRatio) return;
+  const auto bends = bends_at_flat_contacts(assembly, pairs, options.contact.crease_angle, jobs);
+  jobs.parallel_for(pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      if (is_flat(pairs[i])) look_for_line(assembly, bends, pairs[i]);
+  });
+  internal::explain_flanges(assembly, pairs);
+}
+
+DetectedJoint joint_of(const PairOfParts& pair) {
+  const std::vector<JointHypothesis>& hypotheses = pair.slippage.hypotheses;
   DetectedJoint out;
-  out.a = regions.front().a, out.b = regions.front().b;
-  out.joint = slippage.hypotheses.front().joint;
-  out.confidence = slippage.hypotheses.front().confidence;
-  out.reasons = {contact_in_words(regions), slippage.hypotheses.front().reason};
-  for (std::size_t i = 1; i < slippage.hypotheses.size(); ++i)
-    if (i == 1 || slippage.hypotheses[i].confidence > internal::tuning().types.others.worth_telling)
-      out.other_hypotheses.push_back(slippage.hypotheses[i]);
-  out.contact_points = points_of(regions);
+  out.a = pair.a(), out.b = pair.b();
+  out.joint = hypotheses.front().joint;
+  out.confidence = hypotheses.front().confidence;
+  out.reasons = {contact_in_words(pair.regions), hypotheses.front().reason};
+  for (std::size_t i = 1; i < hypotheses.size(); ++i)
+    if (i == 1 || hypotheses[i].confidence > internal::tuning().types.others.worth_telling)
+      out.other_hypotheses.push_back(hypotheses[i]);
+  out.contact_points = points_of(pair.regions);
   out.influence = box_around(out.contact_points, out.joint.frame.axes);
-  for (const ContactRegion& r : regions) out.gap = std::max(out.gap, r.gap);
+  for (const ContactRegion& r : pair.regions) out.gap = std::max(out.gap, r.gap);
   return out;
 }
 
@@ -76,16 +122,16 @@ std::vector<DetectedJoint> detect_joints(const Assembly& assembly, const Detecti
   auto regions = find_contact_regions(assembly, options.contact, jobs,
                                       [&](double part) { tell(kContactsShare * part, "contacts"); });
   std::erase_if(regions, [](const ContactRegion& r) { return !conforms(r); });
-  std::vector<std::vector<ContactRegion>> by_pair;
+  std::vector<PairOfParts> pairs;
   for (ContactRegion& region : regions) {
-    if (by_pair.empty() || by_pair.back().front().a != region.a || by_pair.back().front().b != region.b)
-      by_pair.emplace_back();
-    by_pair.back().push_back(std::move(region));
+    if (pairs.empty() || pairs.back().a() != region.a || pairs.back().b() != region.b) pairs.emplace_back();
+    pairs.back().regions.push_back(std::move(region));
   }
   tell(kContactsShare, "joints");
-  std::vector<DetectedJoint> joints(by_pair.size());
-  jobs.parallel_for(by_pair.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) joints[i] = joint_of(by_pair[i], options.slippage);
+  analyse(assembly, options, jobs, pairs);
+  std::vector<DetectedJoint> joints(pairs.size());
+  jobs.parallel_for(pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) joints[i] = joint_of(pairs[i]);
   });
   std::erase_if(joints, [&](const DetectedJoint& j) { return j.confidence < options.min_confidence; });
   tell(1.0, "done");

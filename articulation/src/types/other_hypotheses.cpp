@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "tuning.h"
@@ -44,6 +45,23 @@ std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regio
   return plane.origin + plane.axes.leftCols<2>() * middle;
 }
 
+/// A turn about a flat contact's normal, with a share of the confidence in both.
+void add_turn(const Vec3& through, std::string reason, Slippage& out) {
+  JointHypothesis& first = out.hypotheses.front();
+  for (const JointHypothesis& other : out.hypotheses)
+    if (other.joint.type == JointType::kRevolute) first.confidence += other.confidence;
+  JointHypothesis turns = first;
+  turns.joint.type = JointType::kRevolute;
+  const Mat3& plane = first.joint.frame.axes;
+  turns.joint.frame.origin = through;
+  turns.joint.frame.axes << plane.col(2), plane.col(0), plane.col(1);
+  turns.reason = std::move(reason);
+  turns.confidence = 0.0;
+  replace_hypothesis(turns, out);
+  turns.confidence = share_of_first(tuning().types.others.round_share, out);
+  replace_hypothesis(std::move(turns), out);
+}
+
 }  // namespace
 
 double share_of_first(double share, Slippage& out) {
@@ -65,19 +83,33 @@ void replace_hypothesis(JointHypothesis hypothesis, Slippage& out) {
 }
 
 void add_hypothesis_of_flange(const std::vector<ContactRegion>& regions, Slippage& out) {
-  JointHypothesis& first = out.hypotheses.front();
+  const JointHypothesis& first = out.hypotheses.front();
   if (first.joint.type != JointType::kPlanar) return;
-  const auto middle = middle_of_round_face(regions, first.joint.frame);
-  if (!middle) return;
-  JointHypothesis turns = first;
-  turns.joint.type = JointType::kRevolute;
-  const Mat3& plane = first.joint.frame.axes;
-  turns.joint.frame.origin = *middle;
-  turns.joint.frame.axes << plane.col(2), plane.col(0), plane.col(1);
-  turns.confidence = share_of_first(tuning().types.others.round_share, out);
-  turns.reason =
-      "the face is round: if it is the flange of a bearing that is not drawn, one part turns about its middle";
-  replace_hypothesis(std::move(turns), out);
+  if (const auto middle = middle_of_round_face(regions, first.joint.frame))
+    add_turn(*middle,
+             "the face is round: if it is the flange of a bearing that is not drawn, one part turns about its middle",
+             out);
+}
+
+void add_hypothesis_of_line(const Vec3& point, Slippage& out) {
+  const JointFrame& plane = out.hypotheses.front().joint.frame;
+  const Vec3 normal = plane.axes.col(2);
+  add_turn(point + normal * normal.dot(plane.origin - point),
+           "symmetry: surfaces of both parts turn into themselves about one line", out);
+}
+
+void prefer_turn(Slippage& out) {
+  const auto is_turn = [](const JointHypothesis& h) { return h.joint.type == JointType::kRevolute; };
+  const double worth = tuning().types.others.worth_telling;
+  auto turn = std::find_if(out.hypotheses.begin(), out.hypotheses.end(), is_turn);
+  if (turn == out.hypotheses.end() || turn->confidence < worth) {
+    add_turn(out.hypotheses.front().joint.frame.origin, "the middle of the contact stands for its axis", out);
+    turn = std::find_if(out.hypotheses.begin(), out.hypotheses.end(), is_turn);
+  }
+  std::swap(turn->confidence, out.hypotheses.front().confidence);
+  turn->reason =
+      "chain: flat contacts that look different ways do not rest on each other, so bearings hold them; " + turn->reason;
+  std::rotate(out.hypotheses.begin(), turn, turn + 1);
 }
 
 }  // namespace limber::internal

@@ -21,4 +21,12 @@ void replace_hypothesis(JointHypothesis hypothesis, Slippage& out);
 /// turn stays the second hypothesis.
 void add_hypothesis_of_flange(const std::vector<ContactRegion>& regions, Slippage& out);
 
+/// A turn about a line along a flat contact's normal about which surfaces of both parts near it turn into themselves:
+/// the outlines of flanges, housings and covers tell an axis that the contact does not.
+/// @param point of the line
+void add_hypothesis_of_line(const Vec3& point, Slippage& out);
+
+/// Puts the turn of a flat contact first and the slide second, where the whole mechanism rules the slide out.
+void prefer_turn(Slippage& out);
+
 }  // namespace limber::internal
