@@ -90,6 +90,7 @@ struct ErrorSetting {
   bool residual = true;                  ///< static answers of the modes left out, where loads act and bodies touch
   std::string basis = "float";           ///< or "half": shapes rounded to IEEE half precision
   int mesh = 1;                          ///< times as many cells along each axis
+  bool quadratic = false;                ///< ten-node tets; all nodes have four
   double drive = 1.0;                    ///< see driven(), which the caller calls
 };
 std::string text(const ErrorSetting& setting);
@@ -106,7 +107,7 @@ class SceneBakery {
   const BakedScene& baked(const ErrorScene& scene, const ErrorSetting& setting);
 
  private:
-  std::map<std::tuple<std::string, int, bool, std::string, int>, BakedScene> known_;
+  std::map<std::tuple<std::string, int, bool, std::string, int, bool>, BakedScene> known_;
 };
 
 /// The scene file's text. @param asset_file of a body's name

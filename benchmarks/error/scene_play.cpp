@@ -64,6 +64,7 @@ Asset baked_body(const ErrorScene& scene, std::size_t i, const ErrorSetting& set
   options.materials = {{"*", body.material}};
   options.analysis.modes = options.limits.max_modes = setting.modes;
   options.analysis.mass = MassKind::kConsistent;  // as the references have
+  options.elements = setting.quadratic ? Elements::kQuadratic : Elements::kLinear;
   options.volume_block = body.coupled;
   if (body.clamped) options.fixed = {NodesByIndex{clamped_nodes(body, input.mesh)}};
   if (setting.residual) {
@@ -247,7 +248,8 @@ double error_until(const ErrorScene& scene, const PlayedScene& seen, const Playe
 }  // namespace
 
 const BakedScene& SceneBakery::baked(const ErrorScene& scene, const ErrorSetting& setting) {
-  BakedScene& baked = known_[{scene.name, setting.modes, setting.residual, setting.basis, setting.mesh}];
+  BakedScene& baked =
+      known_[{scene.name, setting.modes, setting.residual, setting.basis, setting.mesh, setting.quadratic}];
   if (!baked.assets.empty()) return baked;
   const double begin = thread_seconds();
   for (std::size_t i = 0; i < scene.bodies.size(); ++i)
