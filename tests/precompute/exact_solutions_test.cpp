@@ -1,5 +1,5 @@
-/// Bodies whose frequencies are known, on meshes that are refined: linear tets with consistent mass must come down to
-/// them as h², and not pass them.
+/// Bodies whose frequencies are known, on meshes that are refined: with consistent mass linear tets must come down to
+/// them as h², ten-node tets as h⁴ where sides are flat, and not pass them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "limber/mesh/ten_node_tet.h"
 #include "limber/precompute/modal_analysis.h"
 #include "tet_box.h"
 
@@ -41,8 +42,13 @@ double frequency_of(const ModalAnalysis& found, const TetMesh& mesh, const Field
   return frequency;
 }
 
-/// Errors of two meshes, the second twice as fine: both from above, falling as h² to within a band for terms of h⁴.
-void expect_second_order_from_above(double coarse, double fine, double exact, double from = 1.75, double to = 2.25) {
+TetMesh with_ten_nodes(TetMesh mesh) {
+  add_mid_edge_nodes(mesh);
+  return mesh;
+}
+
+/// Errors of two meshes, the second twice as fine: both from above, their order within a band for higher terms.
+void expect_order_from_above(double coarse, double fine, double exact, double from = 1.75, double to = 2.25) {
   EXPECT_GT(fine, exact);
   EXPECT_GT(coarse, fine);
   const double order = std::log2((coarse - exact) / (fine - exact));
@@ -61,7 +67,7 @@ TEST(ExactSolution, BarWithoutPoissonEffectTendsToHalfWaves) {
     const TetMesh mesh = tet_box(n, n / 4, n / 4, {1.0, 0.25, 0.25});
     f[level] = frequency_of(analyse(mesh, m, 12), mesh, field);
   }
-  expect_second_order_from_above(f[0], f[1], exact);
+  expect_order_from_above(f[0], f[1], exact);
 }
 
 /// A cube [0, 1]³ of cells³ cells, each cut into 24 tets around its centre and the centres of its faces: as symmetric
@@ -97,12 +103,12 @@ inline TetMesh symmetric_cube(int cells) {
   return mesh;
 }
 
-TEST(ExactSolution, LameModesOfACubeAtAnyPoissonRatio) {
-  // u = (cos πx sin πy, −sin πx cos πy, 0): no normal stress on any face, f = √(μ/2ρ)/L, three of them.
-  for (const double nu : {0.0, 0.3, 0.45}) {
+/// u = (cos πx sin πy, −sin πx cos πy, 0): no normal stress on any face, f = √(μ/2ρ)/L, three of them.
+void expect_lame_modes(const std::array<TetMesh, 2>& meshes, std::initializer_list<double> poisson_ratios, double from,
+                       double to) {
+  for (const double nu : poisson_ratios) {
     const Material m{.youngs_modulus = 70e9, .poisson_ratio = nu, .density = 2700.0};
     const double exact = std::sqrt(m.shear_modulus() / (2.0 * m.density));
-    const std::array meshes{symmetric_cube(4), symmetric_cube(8)};
     const std::array found{analyse(meshes[0], m, 18), analyse(meshes[1], m, 18)};
     for (int normal = 0; normal < 3; ++normal) {
       const int a = (normal + 1) % 3, b = (normal + 2) % 3;
@@ -112,11 +118,18 @@ TEST(ExactSolution, LameModesOfACubeAtAnyPoissonRatio) {
         u[b] = -std::sin(pi * x[a]) * std::cos(pi * x[b]);
         return u;
       };
-      // With ν > 0 the dilatation that these elements cannot avoid costs extra, and h⁴ still counts.
-      expect_second_order_from_above(frequency_of(found[0], meshes[0], field), frequency_of(found[1], meshes[1], field),
-                                     exact, 1.7, 2.1);
+      expect_order_from_above(frequency_of(found[0], meshes[0], field), frequency_of(found[1], meshes[1], field), exact,
+                              from, to);
     }
   }
+}
+
+// With ν > 0 the dilatation that linear elements cannot avoid costs extra, and h⁴ still counts.
+TEST(ExactSolution, LameModesOfACubeAtAnyPoissonRatio) {
+  expect_lame_modes({symmetric_cube(4), symmetric_cube(8)}, {0.0, 0.3, 0.45}, 1.7, 2.1);
+}
+TEST(ExactSolution, LameModesOfACubeByTenNodeTetsAreOfOrderFour) {
+  expect_lame_modes({with_ten_nodes(symmetric_cube(2)), with_ten_nodes(symmetric_cube(4))}, {0.499}, 3.5, 4.5);
 }
 
 /// A ball of radius 1: a box of cells about the origin whose shells are drawn out to spheres. The cells' diagonals run
@@ -155,9 +168,13 @@ TEST(ExactSolution, TorsionOfAFreeSphere) {
   const double exact = 2.501132620409396 * std::sqrt(m.shear_modulus() / m.density) / (2 * pi);
   const auto coarse = frequencies(analyse(ball(3), m, 6)), fine = frequencies(analyse(ball(6), m, 6));
   for (int i = 0; i < 5; ++i) {
-    expect_second_order_from_above(coarse[i], fine[i], exact);
+    expect_order_from_above(coarse[i], fine[i], exact);
     EXPECT_NEAR((4.0 * fine[i] - coarse[i]) / 3.0, exact, 0.005 * exact);  // Richardson
   }
+  // What facets cost stays, of order 2, with ten-node tets.
+  const auto few = frequencies(analyse(with_ten_nodes(ball(2)), m, 6)),
+             many = frequencies(analyse(with_ten_nodes(ball(4)), m, 6));
+  for (int i = 0; i < 5; ++i) expect_order_from_above(few[i], many[i], exact);
 }
 
 TEST(ExactSolution, RefinementLowersEveryFrequencyOfNestedMeshes) {

@@ -113,10 +113,9 @@ struct Effectivity {
 };
 
 /// Of the lowest modes, those that a mesh does not mix with others of nearly the same frequency.
-Effectivity effectivity(const FreeBody& body, const testing::RitzBox& ritz, TetMesh mesh) {
+Effectivity effectivity(const FreeBody& body, const testing::RitzBox& ritz, const TetMesh& mesh) {
   constexpr int kModes = 6;
   constexpr double kAlike = 0.97;
-  add_mid_edge_nodes(mesh);
   const Told told = analyse(mesh, std::span(&body.material, 1), {}, kModes);
   const auto rows = 3 * static_cast<Eigen::Index>(mesh.nodes.size());
   Eigen::MatrixXd exact(rows, ritz.modes());
@@ -139,13 +138,42 @@ TEST_P(FrequencyError, OfTenNodeTetsIsToldWithinAFactorOfTwo) {
   const FreeBody& body = free_bodies()[GetParam()];
   const testing::RitzBox ritz(body.half_edges, body.material, body.degree, 20);
   for (const Cells& cells : body.cells) {
-    const Effectivity e = effectivity(body, ritz, irregular_mesh(body.half_edges, cells));
+    TetMesh mesh = irregular_mesh(body.half_edges, cells);
+    add_mid_edge_nodes(mesh);
+    const Effectivity e = effectivity(body, ritz, mesh);
     const std::string which = std::to_string(cells[0]) + " cells";
     EXPECT_GE(e.modes, 3) << which;
     EXPECT_GT(e.least, 0.5) << which;
     EXPECT_LT(e.greatest, 2.0) << which;
     RecordProperty(
         which, std::to_string(e.modes) + " modes, " + std::to_string(e.least) + " to " + std::to_string(e.greatest));
+  }
+}
+
+TetMesh cut_in_eight(TetMesh mesh) {
+  add_mid_edge_nodes(mesh);
+  return split_into_eight(mesh);
+}
+
+// Linear tets mix modes: the six lowest are told together. Recovery does not see all of what two cells across a bent
+// part lock. Half a minute, for scripts/errors-told.
+TEST_P(FrequencyError, DISABLED_OfLinearTetsIsToldAtAHalfAtLeastAndWithTwoCellsAcrossAtAThird) {
+  constexpr int kModes = 6;
+  const FreeBody& body = free_bodies()[GetParam()];
+  const testing::RitzBox ritz(body.half_edges, body.material, body.degree, kModes);
+  for (const Cells& cells : body.cells) {
+    const Told told =
+        analyse(cut_in_eight(irregular_mesh(body.half_edges, cells)), std::span(&body.material, 1), {}, kModes);
+    double all_told = 0.0, truth = 0.0;
+    for (int m = 0; m < kModes; ++m) {
+      all_told += told.errors[static_cast<std::size_t>(m)];
+      truth += std::sqrt(told.found.eigenvalues[static_cast<std::size_t>(m)] / ritz.eigenvalue(m)) - 1.0;
+    }
+    const std::string which = std::to_string(2 * cells[0]) + " cells";
+    EXPECT_GT(all_told, (cells[2] == 1 ? 1.0 / 3.0 : 0.5) * truth) << which;
+    EXPECT_LT(all_told, truth) << which;
+    const std::string ratio = std::to_string(all_told / truth);
+    RecordProperty(which, std::to_string(kModes) + " modes, " + ratio + " to " + ratio);
   }
 }
 
@@ -163,11 +191,6 @@ struct HeldBody {
     return analyse(finer, materials, fixed, modes).found.eigenvalues;
   }
 };
-
-TetMesh cut_in_eight(TetMesh mesh) {
-  add_mid_edge_nodes(mesh);
-  return split_into_eight(mesh);
-}
 
 void expect_told(const HeldBody& body, const char* name) {
   constexpr int kModes = 3;
