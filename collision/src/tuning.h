@@ -155,7 +155,8 @@ struct FieldTuning {
   /// Of the other body's longest side, cells of a field that is fine enough for it [4 to 16]. [path] Otherwise
   /// triangles.
   double cells_of_the_other = 8.0;
-  /// Directions along which it is looked whether bodies stay apart [4 to 16]: time alone, but for what goes by.
+  /// Directions along which it is looked whether bodies stay apart, half as many of a pair that was looked at in the
+  /// last query [4 to 16]: time alone, but for what goes by.
   int looks_apart = 8;
   double looked_enough = 0.98;  ///< of their distance, the best gap at which none is looked at any more: time alone
 };

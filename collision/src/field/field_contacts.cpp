@@ -94,8 +94,7 @@ bool FieldView::apart() const {
   const Vec3f middle = 0.5f * (mine->low() + mine->high()), half_mine = 0.5f * (mine->high() - mine->low());
   const Vec3f centre = placed(middle) - 0.5f * (other->low() + other->high());
   const Vec3f half = turn.cwiseAbs() * half_mine + 0.5f * (other->high() - other->low());
-  const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> turning(&query.turn[0][0]);
-  const Vec3f then = centre + turning * middle + Vec3f(query.shift[0], query.shift[1], query.shift[2]);
+  const Vec3f then = centre + carried(middle);
   const float fall = std::hypot(query.fall[0], query.fall[1], query.fall[2]);
   const float spread = query.turning * half_mine.norm() + query.swing + fall + query.curve;
   // On one side now and then, the same one.
@@ -103,16 +102,17 @@ bool FieldView::apart() const {
   return beyond.maxCoeff() > query.reach + spread;
 }
 
-FoundSide at_vertex(const DeformedPointshell& body, Index v) {
+FeatureSide at_vertex(const DeformedPointshell& body, Index v) {
   const CollisionSurface& surface = body.shell().surface();
   const Index t = surface.vertex_triangles(v).front();
-  FoundSide side{.key = feature_key(Feature::Kind::kVertex, v), .triangle = t, .point = body.vertex(v).cast<double>()};
+  FeatureSide side{
+      .key = feature_key(Feature::Kind::kVertex, v), .triangle = t, .point = body.vertex(v).cast<double>()};
   for (std::size_t c = 0; c < 3; ++c) side.weight[c] = surface.triangle(t)[c] == v ? 1.0 : 0.0;
   return side;
 }
 
-FoundSide on_foot(const SurfaceFoothold& foot) {
-  FoundSide side{.triangle = foot.triangle, .point = foot.point.cast<double>()};
+FeatureSide on_foot(const SurfaceFoothold& foot) {
+  FeatureSide side{.key = kAnyFace, .triangle = foot.triangle, .point = foot.point.cast<double>()};
   const auto v = static_cast<double>(foot.weight[1]), w = static_cast<double>(foot.weight[2]);
   side.weight = {1.0 - v - w, v, w};
   return side;
@@ -216,7 +216,7 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   if (view_[0].apart()) return;
   view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, motion_.fall,
                  comes_near(0) + slack * a.shell->shell().cell());
-  if (view_[1].apart() || part(view_[0], view_[1], static_cast<float>(reach_))) return;
+  if (view_[1].apart() || part(view_[0], view_[1], static_cast<float>(reach_), motion_.parting)) return;
   edges_.begin(view_[0], view_[1], static_cast<float>(reach_), static_cast<float>(motion_.passed));
   SampleBounds bounds[2];
   for (int of = 0; of < 2; ++of) {
@@ -351,7 +351,7 @@ void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape,
     const Index v = body.shell->shell().sample_vertex(hit.feature);
     if (std::exchange(last, v) == v) continue;  // repeated to fill the last cluster
     FoundContact contact;
-    FoundSide &mine = contact.of[shape_is_a ? 1 : 0], &other = contact.of[shape_is_a ? 0 : 1];
+    FeatureSide &mine = contact.of[shape_is_a ? 1 : 0], &other = contact.of[shape_is_a ? 0 : 1];
     mine = at_vertex(*body.shell, v);
     const Vec3 p = X_SB * mine.point;
     Vec3 n;
@@ -428,7 +428,7 @@ void FieldContacts::find_shape_in_field(const FieldBody& body, const Capsule& sh
       const Vec3 n =
           distance > 1e-5 * shape.radius ? Vec3(out / (inside ? -distance : distance)) : Vec3(outward.normalized());
       FoundContact contact;
-      FoundSide &mine = contact.of[shape_is_a ? 1 : 0], &other = contact.of[shape_is_a ? 0 : 1];
+      FeatureSide &mine = contact.of[shape_is_a ? 1 : 0], &other = contact.of[shape_is_a ? 0 : 1];
       mine = on_foot(foot), mine.key = key;
       other.point = X_BS.inverse() * Vec3(centre - shape.radius * n);
       contact.normal = shape_is_a ? Vec3(R_AB * n) : Vec3(-n);
@@ -444,7 +444,7 @@ double FieldContacts::comes_near(int of) const {
 
 double FieldContacts::closing(const FieldBody& a, const FieldBody& b, const FieldMotion& motion,
                               const FoundContact& contact) {
-  const auto swing = [](const FieldBody& body, const FoundSide& side) {
+  const auto swing = [](const FieldBody& body, const FeatureSide& side) {
     Vec3 sum = Vec3::Zero();
     if (body.shell == nullptr || side.triangle < 0) return sum;
     const Triangle& t = body.shell->shell().surface().triangle(side.triangle);

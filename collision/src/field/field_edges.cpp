@@ -158,10 +158,7 @@ Vec3f FieldEdges::expected_motion(const EdgePair& pair) const {
     return Vec3f(from + along * (view_[of].mine->swing(ends[1]) - from));
   };
   const FieldView& view = view_[1];
-  const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> turning(&view.query.turn[0][0]);
-  const Vec3f of_b = turning * view.turned_back(pair.on_f - view.shift) +
-                     Vec3f(view.query.shift[0], view.query.shift[1], view.query.shift[2]) +
-                     view.turn * swing(1, pair.f, pair.t);
+  const Vec3f of_b = view.carried(view.turned_back(pair.on_f - view.shift)) + view.turn * swing(1, pair.f, pair.t);
   return swing(0, pair.e, pair.s) - of_b;
 }
 
@@ -330,13 +327,13 @@ const FieldEdges::EdgePair& FieldEdges::narrowest_crossing(std::size_t first, st
   return *best;
 }
 
-FoundSide FieldEdges::on_edge(int of, Index edge, float along, const Vec3f& point) const {
+FeatureSide FieldEdges::on_edge(int of, Index edge, float along, const Vec3f& point) const {
   const CollisionSurface& surface = view_[of].mine->shell().surface();
   const Index t = surface.edge_triangles(edge).front();
   const auto corner = static_cast<std::size_t>(corner_of(surface, t, edge));
   const bool forward = surface.triangle(t)[corner] == surface.edge(edge).vertices[0];
   const double at_next = static_cast<double>(forward ? along : 1.0f - along);
-  FoundSide side{.key = feature_key(Feature::Kind::kEdge, edge), .triangle = t};
+  FeatureSide side{.key = feature_key(Feature::Kind::kEdge, edge), .triangle = t};
   side.weight[corner] = 1.0 - at_next, side.weight[(corner + 1) % 3] = at_next;
   side.point = (of == 0 ? point : view_[1].turned_back(point - view_[1].shift)).cast<double>();
   return side;
@@ -353,8 +350,7 @@ void FieldEdges::finish(std::vector<FoundContact>& found) {
     while (next < piercings_.size() && piercings_[next].loop == piercings_[first].loop) ++next;
     cross_loop(first, next);
   }
-  std::sort(contacts_.begin(), contacts_.end(),
-            [](const FoundContact& c, const FoundContact& d) { return c.id() < d.id(); });
+  std::ranges::sort(contacts_, {}, &FoundContact::id);
   const auto repeated = std::unique(contacts_.begin(), contacts_.end(),
                                     [](const FoundContact& c, const FoundContact& d) { return c.id() == d.id(); });
   found.insert(found.end(), contacts_.begin(), repeated);

@@ -63,7 +63,7 @@ class FieldEdges {
   void find_ways_out(std::size_t first, std::size_t end);
   const EdgePair& narrowest_crossing(std::size_t first, std::size_t end) const;
   void add(const EdgePair& pair, const Vec3f& normal);
-  FoundSide on_edge(int of, Index edge, float along, const Vec3f& point) const;
+  FeatureSide on_edge(int of, Index edge, float along, const Vec3f& point) const;
 
   FieldView view_[2];
   float reach_ = 0.0f, passed_ = 0.0f;

@@ -32,10 +32,9 @@ struct FieldView {
   Vec3f turned_back(const Vec3f& direction) const { return turn.transpose() * direction; }
   /// What the turn is expected to change by.
   auto turning() const { return Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(&query.turn[0][0]); }
-  /// How a vertex of mine is expected to move in the other's frame.
-  Vec3f motion(Index v) const {
-    return turning() * mine->vertex(v) + Eigen::Map<const Vec3f>(query.shift) + turn * mine->swing(v);
-  }
+  /// How a point of mine is expected to move in the other's frame, its modes aside; and a vertex.
+  Vec3f carried(const Vec3f& p) const { return turning() * p + Eigen::Map<const Vec3f>(query.shift); }
+  Vec3f motion(Index v) const { return carried(mine->vertex(v)) + turn * mine->swing(v); }
 };
 
 /// Makes room; what a buffer holds beyond is left as it is.
@@ -47,24 +46,16 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 /// The key of a surface that a vertex meets, whatever the feature there: a face, of no number.
 inline const FeatureKey kAnyFace = feature_key(Feature::Kind::kFace, 0x3fffffff);
 
-/// One body's side of a contact.
-struct FoundSide {
-  FeatureKey key = kAnyFace;
-  Index triangle = -1;
-  std::array<double, 3> weight{0.0, 0.0, 0.0};
-  Vec3 point = Vec3::Zero();  ///< body frame, m
-};
-
 struct FoundContact {
-  FoundSide of[2];             ///< of a and b
-  Vec3 normal = Vec3::Zero();  ///< unit, frame of a, out of b into a
-  double gap = 0.0;            ///< m: normal · (p_a − p_b)
+  FeatureSide of[2] = {{.key = kAnyFace}, {.key = kAnyFace}};  ///< of a and b, each in its body's frame
+  Vec3 normal = Vec3::Zero();                                  ///< unit, frame of a, out of b into a
+  double gap = 0.0;                                            ///< m: normal · (p_a − p_b)
 
   std::uint64_t id() const { return std::uint64_t{of[0].key} << 32 | of[1].key; }
 };
 
-FoundSide at_vertex(const DeformedPointshell& body, Index v);
-FoundSide on_foot(const SurfaceFoothold& foot);
+FeatureSide at_vertex(const DeformedPointshell& body, Index v);
+FeatureSide on_foot(const SurfaceFoothold& foot);
 
 /// A vertex and where it meets the other surface, in the field's frame.
 struct SampleFoot {

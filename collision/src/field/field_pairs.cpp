@@ -3,15 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "limber/core/error.h"
-
 namespace limber::internal {
-namespace {
-
-FeatureSide feature_side(const FoundSide& side) { return {side.key, side.triangle, side.weight, side.point}; }
-
-}  // namespace
-
 void FieldPairs::add_body(Index index, const ManifoldBody& body) {
   const auto at = static_cast<std::size_t>(index);
   if (at >= entries_.size()) entries_.resize(at + 1);
@@ -66,10 +58,6 @@ void FieldPairs::start_query(std::span<const ManifoldBody> bodies, std::span<con
     return std::pair(&a->shell(), a) < std::pair(&b->shell(), b);
   });
   deform(to_deform_, jobs);
-  while (scratch_.size() < static_cast<std::size_t>(jobs.concurrency()))
-    scratch_.push_back(std::make_unique<FieldContacts>());
-  free_.clear();
-  for (const auto& scratch : scratch_) free_.push_back(scratch.get());
 }
 
 FieldBody FieldPairs::field_body(Index index) const {
@@ -89,28 +77,19 @@ Vec3 FieldPairs::place(Index body, const FeatureSide& side) const {
 }
 
 double FieldPairs::closing(const PairQuery& query, const FeatureContact& contact) const {
-  const auto found_side = [](const FeatureSide& s) { return FoundSide{s.key, s.triangle, s.weight, s.point}; };
   return FieldContacts::closing(field_body(query.index_a), field_body(query.index_b),
                                 {query.X_AB, query.expected.X_AB_end, query.expected.fall},
-                                {{found_side(contact.a), found_side(contact.b)}, contact.normal, contact.gap});
+                                {{contact.a, contact.b}, contact.normal, contact.gap});
 }
 
-void FieldPairs::find(const PairQuery& query, std::vector<FeatureContact>& found) {
-  FieldContacts* scratch = nullptr;
-  {
-    const std::lock_guard lock(mutex_);
-    if (free_.empty()) throw ComputationError("FieldPairs: Jobs runs more loop bodies at once than concurrency()");
-    scratch = free_.back(), free_.pop_back();
-  }
-  for (const FoundContact& c : scratch->find(
+void FieldPairs::find(const PairQuery& query, FieldContacts& scratch, std::vector<FeatureContact>& found) const {
+  for (const FoundContact& c : scratch.find(
            field_body(query.index_a), field_body(query.index_b),
-           {query.X_AB, query.expected.X_AB_end, query.expected.fall, query.passing.touching}, query.expected.near)) {
-    FeatureContact contact{feature_side(c.of[0]), feature_side(c.of[1]), c.normal, c.gap};
-    contact.b.point = query.X_AB * contact.b.point;
-    found.push_back(contact);
+           {query.X_AB, query.expected.X_AB_end, query.expected.fall, query.passing.touching, query.expected.parting},
+           query.expected.near)) {
+    found.push_back({c.of[0], c.of[1], c.normal, c.gap});
+    found.back().b.point = query.X_AB * c.of[1].point;
   }
-  const std::lock_guard lock(mutex_);
-  free_.push_back(scratch);
 }
 
 }  // namespace limber::internal

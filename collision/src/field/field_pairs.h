@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <unordered_map>
 #include <vector>
@@ -24,8 +23,8 @@ class FieldPairs {
                    std::span<const Index> changed, Jobs& jobs);
   /// Whether it finds the contacts of two bodies, of which one deforms at least.
   bool takes(Index a, Index b) const;
-  /// Appends; many threads may call it at once. @pre query.by_fields
-  void find(const PairQuery& query, std::vector<FeatureContact>& found);
+  /// Appends; many threads may call it at once, each with scratch of its own. @pre query.by_fields
+  void find(const PairQuery& query, FieldContacts& scratch, std::vector<FeatureContact>& found) const;
   /// Whether it has a body's coordinates, and then: what holds its surface, how far modes are expected to move any
   /// point of it, m, and where a point of it is; body frame.
   bool has(Index body) const { return entries_[static_cast<std::size_t>(body)].shell.has_value(); }
@@ -55,9 +54,6 @@ class FieldPairs {
   std::vector<Index> rigid_;  ///< bodies whose shells are not made yet
   bool deforms_ = false;      ///< a body that deforms was there
   std::vector<DeformedPointshell*> to_deform_;
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<FieldContacts>> scratch_;
-  std::vector<FieldContacts*> free_;
 };
 
 }  // namespace limber::internal

@@ -54,20 +54,26 @@ Vec3f middle(const DeformedPointshell& body) { return 0.5f * (body.low() + body.
 
 }  // namespace
 
-bool part(FieldView& a_in_b, FieldView& b_in_a, float reach) {
+bool part(FieldView& a_in_b, FieldView& b_in_a, float reach, Vec3* first) {
   FieldQuery& query = b_in_a.query;
   query.above = a_in_b.query.above = {};
   const float noise = kNoise * static_cast<float>(b_in_a.mine->shell().longest_side());
   const float enough = reach + noise + query.curve;
-  Vec3f nearest = middle(*b_in_a.other) - b_in_a.placed(middle(*b_in_a.mine)), last = Vec3f::Zero();
+  const bool known = first != nullptr && !first->isZero(0.0);
+  Vec3f nearest = known ? first->cast<float>() : Vec3f(middle(*b_in_a.other) - b_in_a.placed(middle(*b_in_a.mine)));
+  Vec3f last = Vec3f::Zero();
   float best = -std::numeric_limits<float>::infinity();
   const FieldTuning& tuning = collision_tuning().field;
-  for (int i = 0; i < tuning.looks_apart; ++i) {
+  for (int i = 0, looks = known ? tuning.looks_apart / 2 : tuning.looks_apart; i < looks; ++i) {
     const float length = nearest.norm();
     if (!(length > noise)) break;
     const Look look(b_in_a, nearest / length);
     const int end = look.gap(1) < look.gap(0) ? 1 : 0;
-    if (look.gap(end) > best) best = look.gap(end), look.leave_planes(reach, a_in_b, b_in_a);
+    if (look.gap(end) > best) {
+      best = look.gap(end);
+      if (first != nullptr) *first = (nearest / length).cast<double>();
+      look.leave_planes(reach, a_in_b, b_in_a);
+    }
     if (best > enough || (i > 0 && best >= static_cast<float>(tuning.looked_enough) * length)) break;
     const Vec3 next = look.between(b_in_a, end).cast<double>();
     const TrianglePoints corners{i > 0 ? Vec3(nearest.cast<double>()) : next, i > 0 ? Vec3(last.cast<double>()) : next,

@@ -7,7 +7,9 @@ namespace limber::internal {
 
 /// Looks for a direction along which two bodies stay apart on their straight ways (Gilbert, SIAM J. Control 4(1), 1966;
 /// the triangle with the last two vertices in place of a segment), and leaves the planes of the best one in the views.
-/// @param a_in_b, b_in_a of the same pair @param reach m: farther apart is far enough @return whether they are
-bool part(FieldView& a_in_b, FieldView& b_in_a, float reach);
+/// @param a_in_b, b_in_a of the same pair @param reach m: farther apart is far enough
+/// @param first in: where to look first, out of b, frame of a; zero: nobody knows. Out: the best direction. Or null
+/// @return whether they are
+bool part(FieldView& a_in_b, FieldView& b_in_a, float reach, Vec3* first);
 
 }  // namespace limber::internal

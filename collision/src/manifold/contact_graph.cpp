@@ -40,7 +40,7 @@ LivePair& ContactGraph::append(const BodyPair& pair) {
 
 void ContactGraph::reserve(Index modes) {
   modes_ = std::max(modes_, static_cast<std::size_t>(modes));
-  for (LivePair& pair : slots_) pair.amplitudes.reserve(4 * modes_);
+  for (LivePair& pair : slots_) pair.amplitudes.reserve(2 * modes_);
 }
 
 std::uint32_t ContactGraph::take() {
@@ -58,6 +58,7 @@ std::uint32_t ContactGraph::take() {
 
 void ContactGraph::give_back(std::uint32_t slot) {
   slots_[slot].known = false;
+  slots_[slot].parting = Vec3::Zero();
   room_->give_back(slots_[slot].points);
   free_.push_back(slot);
 }

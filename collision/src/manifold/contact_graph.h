@@ -34,14 +34,15 @@ struct KeptPoint {
 struct LivePair {
   bool known = false;                ///< a manifold was made
   RigidTransform X_LS{};             ///< then: the smaller body in the frame of the larger one
-  RigidTransform X_LS_end{};         ///< the same where it was expected to be at the step's end
   double reach = 0.0;                ///< gaps up to here were asked for, m
-  std::vector<double> amplitudes{};  ///< of a, then of b, then how those of either were expected to change
+  Vec3 parting = Vec3::Zero();       ///< of pairs by fields, see FieldMotion; zero: not looked for yet
+  double comes = 0.0;                ///< of pairs by fields: how far they were expected to, m
+  std::vector<double> amplitudes{};  ///< of a, then of b
   std::vector<KeptPoint> points{};   ///< ascending in id
 
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.known, s.X_LS, s.X_LS_end, s.reach, s.amplitudes, s.points);
+    return std::tie(s.known, s.X_LS, s.reach, s.parting, s.comes, s.amplitudes, s.points);
   }
 };
 

@@ -90,9 +90,10 @@ struct ManifoldFinder::Impl {
     return (at(pair.a).modal || at(pair.b).modal) && fields.takes(pair.a, pair.b);
   }
   internal::PairQuery query_of(const BodyPair& pair) const;
+  static double expected_bends(const internal::ManifoldBody& body, const BodyState& state);
   void find_manifolds(Jobs& jobs);
   bool keeps(const internal::LivePair& pair, const internal::PairQuery& query) const;
-  bool keeps_motion(const internal::LivePair& pair, const internal::PairQuery& query) const;
+  double comes(const internal::PairQuery& query) const;
   bool hardly_moved(const internal::PairQuery& query, const RigidTransform& from, const RigidTransform& to) const;
   bool lasts(const internal::PairQuery& query) const;
   void expect(internal::PairQuery& query) const;
@@ -117,7 +118,6 @@ struct ManifoldFinder::Impl {
   void find_planes(std::size_t pair, Index body, internal::ManifoldWorker& worker,
                    std::vector<internal::SupportPlane>& planes);
   bool reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const;
-  RigidTransform smaller_in_larger(const internal::PairQuery& query, const RigidTransform& X_AB) const;
   double farthest(const internal::PairQuery& query) const;
   double slack(const internal::PairQuery& query) const;
   void write_contacts(std::vector<ContactPoint>& contacts, Jobs& jobs);

@@ -29,6 +29,7 @@ PairQuery ManifoldFinder::Impl::query_of(const BodyPair& pair) const {
   PairQuery q{.index_a = pair.a, .index_b = pair.b, .a = a, .b = b, .state_a = state(pair.a), .state_b = state(pair.b)};
   const Quaternion to_a = a.pose.q.conjugate();
   q.X_AB = {to_a * b.pose.q, to_a * (b.pose.p - a.pose.p)};
+  q.X_LS = a.radius <= b.radius ? q.X_AB.inverse() : q.X_AB;
   q.passing = {to_a * (a.displacement - b.displacement), options.flush * std::min(a.thickness, b.thickness)};
   if (a.placed_asleep != b.placed_asleep) q.passing.ground = a.placed_asleep ? 0 : 1;
   q.reach = query.margin + a.reach + b.reach + q.passing.way.norm();
@@ -44,12 +45,9 @@ void ManifoldFinder::Impl::expect(PairQuery& q) const {
   const auto beside = [](const BodyState& s) { return std::isfinite(s.doubt) ? s.doubt : s.reach; };
   q.by_fields = true;
   q.expected.X_AB_end = end_of(q.state_a).inverse() * end_of(q.state_b);
+  q.expected.X_LS_end = q.a.radius <= q.b.radius ? q.expected.X_AB_end.inverse() : q.expected.X_AB_end;
   q.expected.near = query.margin + beside(q.state_a) + beside(q.state_b);
   q.expected.fall = q.state_a.pose.q.conjugate() * query.fall;
-}
-
-RigidTransform ManifoldFinder::Impl::smaller_in_larger(const PairQuery& q, const RigidTransform& X_AB) const {
-  return q.a.radius <= q.b.radius ? X_AB.inverse() : X_AB;
 }
 
 double ManifoldFinder::Impl::farthest(const PairQuery& q) const {
@@ -63,18 +61,10 @@ double ManifoldFinder::Impl::slack(const PairQuery& q) const {
   return parts * farthest(q) + options.recycle_turn * std::min(q.a.radius, q.b.radius);
 }
 
-namespace {
-
-double expected_change(const BodyState& state, std::size_t mode) {
-  return std::isfinite(state.doubt) ? state.end_amplitudes[mode] - state.amplitudes[mode] : 0.0;
-}
-
-}  // namespace
-
 bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const {
   const double farthest = this->farthest(q);
   if (!pair.known || (q.by_fields ? q.expected.near > pair.reach : q.reach > pair.reach + farthest)) return false;
-  if (!hardly_moved(q, pair.X_LS, smaller_in_larger(q, q.X_AB))) return false;
+  if (!hardly_moved(q, pair.X_LS, q.X_LS)) return false;
   double bent = 0.0;
   const double* z = pair.amplitudes.data();
   for (const auto& [body, amplitudes] : {std::pair(&q.a, q.state_a.amplitudes), std::pair(&q.b, q.state_b.amplitudes)})
@@ -83,7 +73,7 @@ bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const
       if (body->modal->surface->skin() != nullptr && change > 0.0) return false;
       bent += change * body->modal->surface->largest_shape(static_cast<Index>(i));
     }
-  return bent <= farthest && (!q.by_fields || keeps_motion(pair, q));
+  return bent <= farthest && (!q.by_fields || pair.comes + comes(q) <= farthest);
 }
 
 bool ManifoldFinder::Impl::hardly_moved(const PairQuery& q, const RigidTransform& from,
@@ -94,28 +84,22 @@ bool ManifoldFinder::Impl::hardly_moved(const PairQuery& q, const RigidTransform
 
 /// Whether a manifold that is made now can be kept in the next query, as far as the expected motion tells.
 bool ManifoldFinder::Impl::lasts(const PairQuery& q) const {
-  if (!q.by_fields) return true;
-  if (!hardly_moved(q, smaller_in_larger(q, q.X_AB), smaller_in_larger(q, q.expected.X_AB_end))) return false;
-  double bends = 0.0;
-  for (const auto& [body, state] : {std::pair(&q.a, &q.state_a), std::pair(&q.b, &q.state_b)})
-    for (std::size_t i = 0; i < state->amplitudes.size(); ++i)
-      bends += std::abs(expected_change(*state, i)) * body->modal->surface->largest_shape(static_cast<Index>(i));
-  return bends <= farthest(q);
+  return !q.by_fields || (q.a.bends + q.b.bends <= farthest(q) && hardly_moved(q, q.X_LS, q.expected.X_LS_end));
 }
 
-/// Whether the expected motion closes at most so much more as manifolds are made for.
-bool ManifoldFinder::Impl::keeps_motion(const LivePair& pair, const PairQuery& q) const {
-  const RigidTransform X_LS = smaller_in_larger(q, q.X_AB), end = smaller_in_larger(q, q.expected.X_AB_end);
-  const Vec3 way = end.p - X_LS.p, way_before = pair.X_LS_end.p - pair.X_LS.p;
-  const Quaternion turn = end.q * X_LS.q.conjugate(), turn_before = pair.X_LS_end.q * pair.X_LS.q.conjugate();
-  double more = (way - way_before).norm() +
-                2.0 * (turn * turn_before.conjugate()).vector().norm() * std::min(q.a.radius, q.b.radius);
-  const double* change = pair.amplitudes.data() + pair.amplitudes.size() / 2;
-  for (const auto& [body, state] : {std::pair(&q.a, &q.state_a), std::pair(&q.b, &q.state_b)})
-    for (std::size_t i = 0; i < state->amplitudes.size(); ++i)
-      more +=
-          std::abs(expected_change(*state, i) - *change++) * body->modal->surface->largest_shape(static_cast<Index>(i));
-  return more <= farthest(q);
+double ManifoldFinder::Impl::expected_bends(const ManifoldBody& body, const BodyState& state) {
+  double bends = 0.0;
+  for (std::size_t i = 0; i < state.amplitudes.size() && std::isfinite(state.doubt); ++i)
+    bends += std::abs(state.end_amplitudes[i] - state.amplitudes[i]) *
+             body.modal->surface->largest_shape(static_cast<Index>(i));
+  return bends;
+}
+
+/// How far points of one body are expected to come against the other.
+double ManifoldFinder::Impl::comes(const PairQuery& q) const {
+  const Quaternion turn = q.expected.X_LS_end.q * q.X_LS.q.conjugate();
+  return (q.expected.X_LS_end.p - q.X_LS.p).norm() + 2.0 * turn.vector().norm() * std::min(q.a.radius, q.b.radius) +
+         q.a.bends + q.b.bends;
 }
 
 namespace {
@@ -131,6 +115,7 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   const bool follows = !q.by_fields && internal::SweptPath::is_needed(q);
   const bool kept = !follows && lasts(q);
   PairQuery farther = q;
+  farther.expected.parting = &pair.parting;
   if (follows)
     farther.reach = internal::SweptPath::near_at_start(q);
   else if (kept)
@@ -148,16 +133,12 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   pair.points.assign(worker.made.begin(), worker.made.end());
   std::sort(pair.points.begin(), pair.points.end(), [](const KeptPoint& p, const KeptPoint& r) { return p.id < r.id; });
   pair.known = kept;
-  pair.X_LS = smaller_in_larger(q, q.X_AB);
-  pair.X_LS_end = smaller_in_larger(q, q.expected.X_AB_end);
+  pair.X_LS = q.X_LS, pair.comes = q.by_fields ? comes(q) : 0.0;
   pair.reach = q.by_fields ? q.expected.near : q.reach;
   pair.amplitudes.clear();
   if (!kept) return;  // nothing asks for them
   pair.amplitudes.assign(q.state_a.amplitudes.begin(), q.state_a.amplitudes.end());
   pair.amplitudes.insert(pair.amplitudes.end(), q.state_b.amplitudes.begin(), q.state_b.amplitudes.end());
-  if (!q.by_fields) return;
-  for (const BodyState* state : {&q.state_a, &q.state_b})
-    for (std::size_t i = 0; i < state->amplitudes.size(); ++i) pair.amplitudes.push_back(expected_change(*state, i));
 }
 
 /// Adds the contacts of all places where two bodies come to touch on their way.
@@ -188,14 +169,14 @@ void ManifoldFinder::Impl::keep(std::span<const FeatureContact> found, const Pai
 /// what is only near.
 void ManifoldFinder::Impl::keep(const FeatureContact& c, double round_a, double round_b, const PairQuery& q,
                                 ManifoldWorker& worker) {
-  const RigidTransform X_BA = q.X_AB.inverse();
+  const Quaternion to_b = q.X_AB.q.conjugate();
   const std::uint64_t id = internal::contact_id({q.index_a, q.index_b}, internal::feature_pair(c));
   const bool inside = c.a.key == kInside || c.b.key == kInside;
   KeptPoint point{.id = inside ? id >> 24 : id, .a = c.a, .b = c.b};
   point.a.point += round_a * c.normal;
-  point.b.point = X_BA * (c.b.point - round_b * c.normal);
+  point.b.point = to_b * (c.b.point - round_b * c.normal - q.X_AB.p);
   point.turns_with_b = is_face(c.b) && !is_face(c.a);
-  point.normal = point.turns_with_b ? X_BA.q * c.normal : c.normal;
+  point.normal = point.turns_with_b ? to_b * c.normal : c.normal;
   point.round_a = round_a, point.round_b = round_b, point.ahead = q.ahead;
   if (q.ahead > 0.0) point.normal = (point.turns_with_b ? q.b : q.a).pose.q.conjugate() * (q.state_a.pose.q * c.normal);
   const auto known = q.ahead == 0.0 ? worker.made.end()

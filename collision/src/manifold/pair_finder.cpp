@@ -29,7 +29,7 @@ std::span<const FeatureContact> PairFinder::find(const PairQuery& q, std::span<c
     against_ground(q, q.b, q.a, q.X_AB.inverse(), q.X_AB.q.conjugate() * -q.passing.way);
     for (FeatureContact& c : found_) c = exchanged(c, q.X_AB);
   } else if (q.by_fields) {
-    fields_->find(q, found_);
+    fields_->find(q, field_contacts_, found_);
   } else {
     by_narrow_phase(q);
   }

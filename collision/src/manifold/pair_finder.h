@@ -18,7 +18,7 @@ class PairFinder {
   explicit PairFinder(const NarrowPhaseOptions& options) : narrow_(options) {}
 
   /// @param fields know the states of this query, and last as long as it
-  void start_query(FieldPairs* fields) { pool_.start_query(), fields_ = fields; }
+  void start_query(const FieldPairs* fields) { pool_.start_query(), fields_ = fields; }
   const FieldPairs& fields() const { return *fields_; }
   /// Until the next call. Of rigid pairs at most kManifoldPoints to a patch.
   /// @param last feature_pair() of those of the last manifold
@@ -46,7 +46,8 @@ class PairFinder {
   NarrowPhase narrow_;
   SurfacePool pool_;
   std::array<DeformedSurface, 2> ahead_;  // of a pair that is on its way
-  FieldPairs* fields_ = nullptr;
+  const FieldPairs* fields_ = nullptr;
+  FieldContacts field_contacts_;
   std::vector<ContactPoint> contacts_;
   std::vector<FeatureContact> found_;
 };

@@ -15,7 +15,8 @@ struct PairQuery {
   const ManifoldBody &a, &b;
   const BodyState &state_a, &state_b;
   RigidTransform X_AB{};
-  double reach = 0.0;  ///< m: gaps up to here are wanted
+  RigidTransform X_LS{};  ///< the smaller body in the frame of the larger one
+  double reach = 0.0;     ///< m: gaps up to here are wanted
   Passing passing{};
   /// Planes that a, or b, rests on beside the other: what of the other reaches no farther is touched along these alone.
   /// In the frame of a, or of b.
@@ -26,9 +27,10 @@ struct PairQuery {
   /// which contacts are wanted beside what the expected motion of their points, and a fall, close, m.
   bool by_fields = false;
   struct {
-    RigidTransform X_AB_end{};
+    RigidTransform X_AB_end{}, X_LS_end{};
     double near = 0.0;
     Vec3 fall = Vec3::Zero();  ///< ContactQuery::fall, frame of a
+    Vec3* parting = nullptr;   ///< see FieldMotion
   } expected{};
 };
 
