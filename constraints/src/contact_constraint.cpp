@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 
 #include "contact_history.h"
@@ -79,6 +80,7 @@ void ContactOptions::validate() const {
 
 struct ContactSet::Impl {
   ContactOptions options;
+  std::vector<const ContactPoint*> points;  // of those that act
   std::vector<PreparedContact> contacts;
   std::vector<VertexShare> corners;  // of their sides, as what follows
   std::vector<Mat3> turns;
@@ -91,22 +93,24 @@ struct ContactSet::Impl {
   std::vector<Index> touched;  // scratch of finish()
 
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
-  void add(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around);
+  void prepare(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around,
+               PreparedContact& contact) const;
+  void measure(const BodyStates& states, const Vec3& gravity, PreparedContact& contact) const;
   void add_corners(const BodyStates& states, PreparedSide& side);
 };
 
-void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around) {
+/// But for what a skin's memory is asked for, which one thread may do at a time.
+void ContactSet::Impl::prepare(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around,
+                               PreparedContact& contact) const {
   const auto surface = [&](Index body) {
     const auto i = static_cast<std::size_t>(body);
     return i < around.surfaces.size() ? around.surfaces[i] : BodySurface{.friction = options.friction};
   };
   const BodySurface of_a = surface(point.a.body), of_b = surface(point.b.body);
-  PreparedContact& contact = contacts.emplace_back();
+  contact = {};
   contact.id = point.id;
   make_side(states, point.a, point.normal, contact.a);
   make_side(states, point.b, -point.normal, contact.b);
-  add_corners(states, contact.a);
-  add_corners(states, contact.b);
   contact.axes = frame_along(point.normal);
   const double smaller = std::min(of_a.friction, of_b.friction);
   contact.friction = smaller > 0.0 ? std::sqrt(of_a.friction * of_b.friction) : 0.0;
@@ -114,14 +118,20 @@ void ContactSet::Impl::add(const BodyStates& states, const ContactPoint& point, 
   contact.restitution = flexes(contact.a) || flexes(contact.b) ? 0.0 : std::max(of_a.restitution, of_b.restitution);
   contact.running = states.pose(point.a.body, StepTime::kStart).q * of_a.velocity -
                     states.pose(point.b.body, StepTime::kStart).q * of_b.velocity;
-  contact.offset = contact.apart(states, StepTime::kStart);
   contact.start_position = point.position + around.origin;
   contact.yielding = flexes(contact.a) || states.is_static(point.b.body) ? point.a.body : point.b.body;
   if (states.is_static(contact.yielding)) contact.yielding = point.b.body;
-  if (const ContactMemory* known = history.find(point.id))
+  if (contact.a.skin == nullptr && contact.b.skin == nullptr) measure(states, around.gravity, contact);
+}
+
+void ContactSet::Impl::measure(const BodyStates& states, const Vec3& gravity, PreparedContact& contact) const {
+  for (PreparedSide* side : {&contact.a, &contact.b})
+    side->start_point = side->place(states.amplitudes(side->body, StepTime::kStart));
+  contact.offset = contact.a.start_position(states) - contact.b.start_position(states);
+  if (const ContactMemory* known = history.find(contact.id))
     contact.last_force = known->force, contact.compliance = known->compliance, contact.slip = known->slip;
   else
-    contact.approach = approach(states, contact, around.gravity);
+    contact.approach = approach(states, contact, gravity);
 }
 
 /// @pre there is room: spans of them stay where they are
@@ -145,9 +155,9 @@ ContactSet::ContactSet(ContactSet&&) noexcept = default;
 ContactSet& ContactSet::operator=(ContactSet&&) noexcept = default;
 
 void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> points,
-                        const ContactSurroundings& surroundings) {
+                        const ContactSurroundings& surroundings, Jobs& jobs) {
   Impl& s = *impl_;
-  s.contacts.clear();
+  s.points.clear();
   s.constraints.clear();
   std::size_t bodies = 0;
   for (const ContactPoint& point : points)
@@ -158,7 +168,18 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   s.corners.reserve(6 * points.size());  // three of each side
   s.turns.reserve(2 * points.size());
   for (const ContactPoint& point : points)
-    if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.add(states, point, surroundings);
+    if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.points.push_back(&point);
+  s.contacts.resize(s.points.size());
+  const auto part = [&](std::size_t first, std::size_t end) {
+    for (std::size_t i = first; i < end; ++i) s.prepare(states, *s.points[i], surroundings, s.contacts[i]);
+  };
+  constexpr std::size_t kAtOnce = 64;
+  jobs.parallel_for(s.contacts.size(), kAtOnce, std::ref(part));
+  for (PreparedContact& contact : s.contacts) {
+    s.add_corners(states, contact.a);
+    s.add_corners(states, contact.b);
+    if (contact.a.skin != nullptr || contact.b.skin != nullptr) s.measure(states, surroundings.gravity, contact);
+  }
   s.pairs.reuse(), s.rolling.reuse();
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= s.contacts.size(); ++i) {

@@ -42,7 +42,7 @@ struct PreparedSide {
   std::span<const VertexShare> corners{};  // with a residual compliance: the vertices that the point lies between
   Mat3* turn = nullptr;                    // of what they yield, at the step's start; null: the body has no skin
   SkinMemory* skin = nullptr;              // null: the body bends by its modes alone
-  Vec3 rigid_point = Vec3::Zero();  // without a model: body frame; where the surface is that of a ball, its centre
+  Vec3 start_point = Vec3::Zero();  // place() at the step's start; where the surface is that of a ball, its centre
   Vec3 rim = Vec3::Zero();          // from there to where it touches, world; as the normal it stays for the step
 
   /// @pre with a model
@@ -56,10 +56,13 @@ struct PreparedSide {
   Vec3 position(const BodyStates& states, StepTime when) const {
     return states.pose(body, when) * place(states.amplitudes(body, when)) + rim;
   }
+  Vec3 start_position(const BodyStates& states) const {
+    return states.pose(body, StepTime::kStart) * start_point + rim;
+  }
   /// How far what is there has come beyond that by rolling, by the end of the step.
   Vec3 rolled(const BodyStates& states, double step) const { return turn_of_step(states, body, step).cross(rim); }
   /// Body frame. @param z amplitudes
-  Vec3 place(std::span<const double> z) const { return model == nullptr ? rigid_point : shape(z).position(at); }
+  Vec3 place(std::span<const double> z) const { return model == nullptr ? start_point : shape(z).position(at); }
   /// Its velocity by the rates ż.
   Vec3 deforming(std::span<const double> z, std::span<const double> rates) const {
     return shape(z).velocity(at, rates);
@@ -68,8 +71,7 @@ struct PreparedSide {
   /// [H03] equation 20; what J itself changes by is left out.
   PointMotion motion(const BodyStates& states) const {
     const RigidTransform& X = states.pose(body, StepTime::kStart);
-    const Vec3 omega = states.angular_velocity(body, StepTime::kStart),
-               centre = position(states, StepTime::kStart) - rim;
+    const Vec3 omega = states.angular_velocity(body, StepTime::kStart), centre = X * start_point;
     const Vec3 turning = omega.cross(centre - X.p);
     Vec3 bending = Vec3::Zero();
     if (model != nullptr)
@@ -117,10 +119,10 @@ struct PreparedContact {
 /// @param inwards the normal, into the body. @param made a new one
 inline void make_side(const BodyStates& states, const ContactSide& side, const Vec3& inwards, PreparedSide& made) {
   made.body = side.body;
-  made.rigid_point = side.point_B;
+  made.start_point = side.point_B;
   if (side.radius > 0.0 && !states.is_static(side.body)) {
     made.rim = -side.radius * inwards;
-    made.rigid_point -= states.pose(side.body, StepTime::kStart).q.conjugate() * made.rim;
+    made.start_point -= states.pose(side.body, StepTime::kStart).q.conjugate() * made.rim;
   }
   if (side.triangle < 0 || states.is_static(side.body)) return;
   made.model = &states.body(side.body).group->model();
@@ -175,8 +177,7 @@ inline double shorter_arm(const BodyStates& states, const PreparedContact& conta
   double arm = std::numeric_limits<double>::infinity();
   for (const PreparedSide* side : {&contact.a, &contact.b})
     if (!states.is_static(side->body))
-      arm = std::min(arm,
-                     (side->position(states, StepTime::kStart) - states.pose(side->body, StepTime::kStart).p).norm());
+      arm = std::min(arm, (side->start_position(states) - states.pose(side->body, StepTime::kStart).p).norm());
   return arm;
 }
 

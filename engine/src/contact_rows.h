@@ -17,8 +17,8 @@ struct ContactRows {
 
   const ContactOptions& options() const { return set.options(); }
   /// @param found at the start of the step, ordered as by ContactSource
-  void take(const BodyStates& states, std::span<const ContactPoint> found, const Vec3& gravity) {
-    set.update(states, found, {.surfaces = surfaces, .gravity = gravity});
+  void take(const BodyStates& states, std::span<const ContactPoint> found, const Vec3& gravity, Jobs& jobs) {
+    set.update(states, found, {.surfaces = surfaces, .gravity = gravity}, jobs);
   }
   void note_surfaces(const BodyTable& bodies) {
     stale = false;

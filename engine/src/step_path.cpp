@@ -17,7 +17,7 @@ void StepPath::reset(const ContactOptions& options) {
 void StepPath::advance(const Substep& substep, StepEvents& events, Jobs& jobs, StageClock& clock) {
   if (registry_->source() != nullptr) {
     search_.find(substep, parts(), rows_, jobs, clock);
-    rows_.take(constraints_->states(), search_.found(), substep.gravity);
+    rows_.take(constraints_->states(), search_.found(), substep.gravity, jobs);
     constraints_->set_contacts(rows_.set.constraints());
   }
   const std::span<const Index> awake = sleep_->awake();

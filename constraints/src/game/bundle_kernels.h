@@ -79,16 +79,18 @@ struct BundleArrays {
   }
 };
 
-/// What a point of a surface that bends by its modes moves by: U of its triangle's corners.
+/// What a side moves by as its body bends: U of its triangle's corners, or of both sides' where a body touches itself.
 struct ModePoint {
-  const float* rows[3][3] = {};  // by corner and axis of the body, padded to whole blocks
-  float weight[3] = {};          // of the corners
+  const float* rows[6][3] = {};  // by corner and axis of the body, padded to whole blocks
+  float weight[6] = {};
+  std::size_t corners = 0;       // those of a weight
   float axes[3][3] = {};         // the contact's, in those of the body: [axis][component]
   const float* roots = nullptr;  // √ρ, padded likewise
   std::size_t blocks = 0;
 };
-/// √ρ n·R U: three blocks, one an axis, of each eight modes.
-void make_mode_rows(const ModePoint& point, Block8* rows);
+/// √ρ n·R U of one contact in each lane. @param points null: a lane without. @param rows three a mode, by axis
+/// @param modes whole blocks
+void make_mode_rows(const ModePoint* const* points, std::int32_t modes, Block8* rows);
 
 /// Rows of frames and effective masses, from axes, levers and the rows of modes; takes from the gaps in `rest` what the
 /// modes give them. @param shapes with a block of zeros at their end

@@ -69,26 +69,49 @@ HWY_INLINE HWY_ATTR void MakeMasses(const PairBundle& bundle, BundleContact& c, 
   Put(hn::Sub(Get(c.rest, lane), bent[0]), c.rest, lane);
 }
 
-HWY_ATTR void MakeModeRows(const ModePoint& point, Block8* rows) {
+/// Eight modes of a point from one on, by axis: eight numbers each.
+HWY_INLINE HWY_ATTR void MakeEightModes(const ModePoint& point, std::size_t first, Block8* to) {
   const Lanes d;
-  for (std::size_t k = 0; k < point.blocks; ++k, rows += 3)
-    for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
-      const std::size_t mode = 8 * k + lane;
-      const Vector root = hn::LoadU(d, point.roots + mode);
-      Vector shape[3];
-      for (std::size_t i = 0; i < 3; ++i) {
-        shape[i] = hn::Mul(hn::Set(d, point.weight[0]), hn::LoadU(d, point.rows[0][i] + mode));
-        for (std::size_t c = 1; c < 3; ++c)
-          shape[i] = hn::MulAdd(hn::Set(d, point.weight[c]), hn::LoadU(d, point.rows[c][i] + mode), shape[i]);
-        shape[i] = hn::Mul(root, shape[i]);
-      }
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const float* n = point.axes[axis];
-        const Vector sum = hn::MulAdd(hn::Set(d, n[1]), shape[1],
-                                      hn::MulAdd(hn::Set(d, n[2]), shape[2], hn::Mul(hn::Set(d, n[0]), shape[0])));
-        Put(sum, rows[axis], lane);
-      }
+  for (std::size_t at = 0; at < 8; at += kLanesAtOnce) {
+    const std::size_t mode = first + at;
+    const Vector root = hn::LoadU(d, point.roots + mode);
+    Vector shape[3];
+    for (std::size_t i = 0; i < 3; ++i) {
+      shape[i] = hn::Mul(hn::Set(d, point.weight[0]), hn::LoadU(d, point.rows[0][i] + mode));
+      for (std::size_t c = 1; c < point.corners; ++c)
+        shape[i] = hn::MulAdd(hn::Set(d, point.weight[c]), hn::LoadU(d, point.rows[c][i] + mode), shape[i]);
+      shape[i] = hn::Mul(root, shape[i]);
     }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float* n = point.axes[axis];
+      Put(hn::MulAdd(hn::Set(d, n[1]), shape[1],
+                     hn::MulAdd(hn::Set(d, n[2]), shape[2], hn::Mul(hn::Set(d, n[0]), shape[0]))),
+          to[axis], at);
+    }
+  }
+}
+
+HWY_ATTR void MakeModeRows(const ModePoint* const* points, std::int32_t modes, Block8* rows) {
+  Block8 eight[kBundleLanes][3];
+  for (std::int32_t first = 0; first < modes; first += 8, rows += 24) {
+    const auto mode = static_cast<std::size_t>(first);
+    for (std::size_t l = 0; l < kBundleLanes; ++l) {
+      const ModePoint* point = points[l];
+      if (point != nullptr && mode < 8 * point->blocks)
+        MakeEightModes(*point, mode, eight[l]);
+      else
+        for (Block8& axis : eight[l]) axis = {};
+    }
+    for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce)
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float* from[kLanesAtOnce];
+        for (std::size_t l = 0; l < kLanesAtOnce; ++l) from[l] = eight[lane + l][axis].v;
+        Vector v[8];
+        Gather4(from, 0, v);
+        Gather4(from, 4, v + 4);
+        for (std::size_t i = 0; i < 8; ++i) Put(v[i], rows[3 * i + axis], lane);
+      }
+  }
 }
 
 HWY_ATTR void MakeBundleRows(const BundleArrays& all, const Block8* shapes) {
@@ -198,7 +221,9 @@ HWY_EXPORT(MakeModeRows);
 HWY_EXPORT(MakeBundleRows);
 HWY_EXPORT(MeasureBundles);
 
-void make_mode_rows(const ModePoint& point, Block8* rows) { HWY_DYNAMIC_DISPATCH(MakeModeRows)(point, rows); }
+void make_mode_rows(const ModePoint* const* points, std::int32_t modes, Block8* rows) {
+  HWY_DYNAMIC_DISPATCH(MakeModeRows)(points, modes, rows);
+}
 
 void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes) {
   HWY_DYNAMIC_DISPATCH(MakeBundleRows)(bundles, shapes);

@@ -1,7 +1,6 @@
 #include "game_contacts.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "../tuning.h"
@@ -11,10 +10,6 @@ namespace limber::internal {
 namespace {
 
 constexpr float kPushShare = kConstraintsTuning.small_steps.push_share;
-
-void write_axis(const Vec3& v, float* to) {
-  for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(v[i]);
-}
 
 /// nᵀG n of a side's corners: what it yields to a force along n alone, m/N.
 double yield_of(const PreparedSide& side, const Vec3& n) {
@@ -26,9 +21,6 @@ double yield_of(const PreparedSide& side, const Vec3& n) {
       if (!local || v.vertex == w.vertex) sum += v.share * w.share * compliance.block(v.vertex, w.vertex);
   return n.dot(sum * n);
 }
-
-/// What a contact of a body with a skin is made by works on that skin's memory.
-bool shares_memory(const PreparedContact& contact) { return contact.a.skin != nullptr || contact.b.skin != nullptr; }
 
 /// m; 0: none.
 double rolling_radius(const BodyStates& states, const PreparedContact& contact, const GameContacts::Options& options) {
@@ -63,69 +55,78 @@ bool meets_law(const Vec3& f, double friction) {
 void GameContacts::begin_step(const BodyStates& states, GameBodies& bodies, std::span<PreparedContact> contacts,
                               const Options& options, Jobs& jobs) {
   contacts_ = contacts;
-  for (const PreparedContact& contact : contacts)
-    for (const Index body : {contact.a.body, contact.b.body})
-      if (bodies.of(body) >= 0 && contact.a.body != contact.b.body) bodies.keep_axes(bodies.of(body));
-  bundles_.arrange(bodies, contacts);
-  bundles_.fill(jobs, [&](std::size_t i) {
-    if (!shares_memory(contacts[i])) put(states, bodies, i, options);
-  });
-  for (std::size_t i = 0; i < contacts.size(); ++i)
-    if (shares_memory(contacts[i])) put(states, bodies, i, options);
-  bundles_.for_all(jobs, [&](const BundleArrays& part) { make_bundle_rows(part, bodies.shapes().data()); });
   ties_.reset(bodies.bodies().size());
   touched_.assign(bodies.bodies().size(), false);
   for (const PreparedContact& contact : contacts) {
     const std::int32_t a = bodies.of(contact.a.body), b = bodies.of(contact.b.body);
-    for (const std::int32_t frame : {a, b})
-      if (frame >= 0) touched_[static_cast<std::size_t>(frame)] = true;
+    for (const std::int32_t frame : {a, b}) {
+      if (frame < 0) continue;
+      touched_[static_cast<std::size_t>(frame)] = true;
+      if (a != b) bodies.keep_axes(frame);
+    }
     if (a >= 0 && b >= 0) ties_.join(a, b);
   }
-  islands_.resize(bodies.bodies().size());
-  for (std::size_t i = 0; i < islands_.size(); ++i) islands_[i] = ties_.root(static_cast<Index>(i));
+  bundles_.arrange(bodies, contacts);
+  make_skin_rows(states, bodies);
+  bundles_.fill(
+      jobs, [&](std::size_t i) { put(states, bodies, i, options); },
+      [&](std::size_t i, std::size_t side, ModePoint& point) { return find_modes(bodies, i, side, point); });
+  bundles_.for_all(jobs, [&](const BundleArrays& part) { make_bundle_rows(part, bodies.shapes().data()); });
 }
 
 void GameContacts::put(const BodyStates& states, const GameBodies& bodies, std::size_t i, const Options& options) {
   const PreparedContact& contact = contacts_[i];
   bundles_.put(i, make(states, bodies, contact, options));
-  for (std::size_t s = 0; s < 2; ++s) put_modes(states, bodies, i, s);
   if (const double radius = rolling_radius(states, contact, options); radius > 0.0)
     bundles_.resist_rolling(i, radius, last_moment(contact));
 }
 
-/// √ρ n·R U of each mode. Where a body touches itself its modes get what both sides do.
-void GameContacts::put_modes(const BodyStates& states, const GameBodies& bodies, std::size_t i, std::size_t s) {
-  const PreparedSide& side = contacts_[i].side(s);
+/// What a side's rows of modes are made of; false: it has none. A body that touches itself has those of both sides in
+/// one.
+bool GameContacts::find_modes(const GameBodies& bodies, std::size_t i, std::size_t s, ModePoint& point) const {
+  const PreparedContact& contact = contacts_[i];
+  const PreparedSide& side = contact.side(s);
+  const bool self = contact.a.body == contact.b.body;
   const std::int32_t at = bodies.of(side.body);
-  if (at < 0 || side.model == nullptr || bodies.body(at).modes == nullptr) return;
+  if (at < 0 || side.model == nullptr || bodies.body(at).modes == nullptr || (self && s == 1)) return false;
   const std::vector<float>& roots = bodies.body(at).modes->roots();
-  const std::size_t blocks = roots.size() / 8, of = contacts_[i].a.body == contacts_[i].b.body ? 0 : s;
-  const Mat3 axes = bodies.body(at).start.R.transpose() * (PreparedContact::sign(s) * contacts_[i].axes);
-  if (side.skin != nullptr) {
-    modal_.resize(static_cast<std::size_t>(side.model->modes()));
-    skin_rows_.assign(3 * blocks, {});
-    for (Index axis = 0; axis < 3; ++axis) {
-      std::ranges::fill(modal_, 0.0);
-      side.shape(states.amplitudes(side.body, StepTime::kStart)).add_force(side.at, axes.col(axis), modal_);
-      for (std::size_t m = 0; m < modal_.size(); ++m)
-        skin_rows_[3 * (m / 8) + static_cast<std::size_t>(axis)].v[m % 8] = static_cast<float>(modal_[m]) * roots[m];
-    }
-    return bundles_.add_modes(i, of, 0, skin_rows_);
-  }
-  constexpr std::size_t kAtOnce = 4;
-  std::array<Block8, 3 * kAtOnce> rows;
-  const VertexRows& vertices = side.model->collision_rows();
+  const Mat3 axes = bodies.body(at).start.R.transpose() * (PreparedContact::sign(s) * contact.axes);
+  Eigen::Map<Eigen::Matrix3f>(&point.axes[0][0]) = axes.cast<float>();
+  point.roots = roots.data(), point.blocks = roots.size() / 8, point.corners = 0;
+  add_corners(i, s, 1.0f, point);
+  if (self) add_corners(i, 1, -1.0f, point);
+  return point.corners > 0;
+}
+
+void GameContacts::add_corners(std::size_t i, std::size_t s, float sign, ModePoint& point) const {
+  const PreparedSide& side = contacts_[i].side(s);
   const Triangle& corners = side.model->collision().triangles[static_cast<std::size_t>(side.at.triangle)];
-  ModePoint point;
-  for (int axis = 0; axis < 3; ++axis) write_axis(axes.col(axis), point.axes[axis]);
-  for (std::size_t first = 0; first < blocks; first += kAtOnce) {
-    point.roots = roots.data() + 8 * first, point.blocks = std::min(kAtOnce, blocks - first);
-    for (std::size_t c = 0; c < 3; ++c) {
-      point.weight[c] = static_cast<float>(side.at.weight[c]);
-      for (int x = 0; x < 3; ++x) point.rows[c][x] = vertices.row(corners[c], x) + 8 * first;
+  for (std::size_t c = 0; c < (side.skin != nullptr ? 1u : 3u); ++c) {
+    if (side.skin == nullptr && side.at.weight[c] == 0.0) continue;
+    point.weight[point.corners] = sign * (side.skin != nullptr ? 1.0f : static_cast<float>(side.at.weight[c]));
+    for (int x = 0; x < 3; ++x)
+      point.rows[point.corners][x] =
+          side.skin != nullptr ? &skin_rows_[skin_at_[2 * i + s] + 8 * point.blocks * static_cast<std::size_t>(x)]
+                               : side.model->collision_rows().row(corners[c], x);
+    ++point.corners;
+  }
+}
+
+/// U of points of bodies with skins: one by one, as they work on the skin's memory.
+void GameContacts::make_skin_rows(const BodyStates& states, const GameBodies& bodies) {
+  skin_rows_.clear();
+  skin_at_.resize(2 * contacts_.size());
+  for (std::size_t n = 0; n < skin_at_.size(); ++n) {
+    const PreparedSide& side = contacts_[n / 2].side(n % 2);
+    const std::int32_t at = bodies.of(side.body);
+    if (side.skin == nullptr || at < 0 || bodies.body(at).modes == nullptr) continue;
+    skin_at_[n] = skin_rows_.size();
+    for (int axis = 0; axis < 3; ++axis) {
+      modal_.assign(static_cast<std::size_t>(side.model->modes()), 0.0);
+      side.shape(states.amplitudes(side.body, StepTime::kStart)).add_force(side.at, Vec3::Unit(axis), modal_);
+      for (const double u : modal_) skin_rows_.push_back(static_cast<float>(u));
+      skin_rows_.resize(skin_at_[n] + static_cast<std::size_t>(axis + 1) * bodies.body(at).modes->roots().size());
     }
-    make_mode_rows(point, rows.data());
-    bundles_.add_modes(i, of, first, std::span(rows).first(3 * point.blocks));
   }
 }
 
@@ -137,7 +138,7 @@ ContactRow GameContacts::make(const BodyStates& states, const GameBodies& bodies
   for (std::size_t s = 0; s < 2; ++s) {
     const PreparedSide& side = contact.side(s);
     if (const std::int32_t at = bodies.of(side.body); at >= 0) {
-      row.side[s].arm = side.place(states.amplitudes(side.body, StepTime::kStart));
+      row.side[s].arm = side.start_point;
       row.side[s].lever = bodies.body(at).start.R * row.side[s].arm + side.rim;
     }
     const auto number = static_cast<std::size_t>(side.body);
@@ -245,25 +246,24 @@ void GameContacts::end_step(const SubstepPlan& plan) {
   rolling_memory_.clear();
   rebound_memory_.clear();
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    tell(contacts_[i], {bundles_.force(i), bundles_.sum(i), bundles_.compliance(i)}, plan);
+    tell(i, plan);
     if (bundles_.resists_rolling(i)) rolling_memory_.push_back({contacts_[i].id, bundles_.moment(i)});
-    if (contacts_[i].restitution > 0.0) remember_rebound({contacts_[i].id, bundles_.stage(i), bundles_.energy(i)});
+    const float stage = contacts_[i].restitution > 0.0 ? bundles_.stage(i) : 0.0f;
+    if (stage > 0.0f && stage < kParted) rebound_memory_.push_back({contacts_[i].id, stage, bundles_.energy(i)});
   }
   std::ranges::sort(rolling_memory_, {}, &Rolling::id);
   std::ranges::sort(rebound_memory_, {}, &Rebound::id);
 }
 
-void GameContacts::remember_rebound(const Rebound& rebound) {
-  if (rebound.stage > 0.0f && rebound.stage < kParted) rebound_memory_.push_back(rebound);
-}
-
 /// Its spring stores what the row's law does, by the normal force of the last substep: ½ c F².
-void GameContacts::tell(PreparedContact& contact, const Told& told, const SubstepPlan& plan) const {
-  contact.last_force = contact.axes * told.last;
-  contact.mean_force = contact.axes * (told.sum / plan.count);
+void GameContacts::tell(std::size_t i, const SubstepPlan& plan) {
+  PreparedContact& contact = contacts_[i];
+  const Vec3 last = bundles_.force(i);
+  contact.last_force = contact.axes * last;
+  contact.mean_force = contact.axes * (bundles_.sum(i) / plan.count);
   contact.impulse = plan.step * contact.mean_force;
-  const double square = told.last.squaredNorm();
-  contact.compliance = square > 0.0 ? told.compliance * told.last[0] * told.last[0] / square : 0.0;
+  const double square = last.squaredNorm();
+  contact.compliance = square > 0.0 ? bundles_.compliance(i) * last[0] * last[0] / square : 0.0;
   contact.slip = 0.0;
 }
 

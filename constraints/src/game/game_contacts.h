@@ -74,15 +74,11 @@ class GameContacts {
   ContactRow make(const BodyStates& states, const GameBodies& bodies, const PreparedContact& contact,
                   const Options& options) const;
   void put(const BodyStates& states, const GameBodies& bodies, std::size_t contact, const Options& options);
-  void put_modes(const BodyStates& states, const GameBodies& bodies, std::size_t contact, std::size_t side);
-  /// Of a contact after the step: the last substep's force along its axes, the sum of all, and its compliance.
-  struct Told {
-    Vec3 last, sum;
-    double compliance = 0.0;
-  };
-  void remember_rebound(const Rebound& rebound);
+  bool find_modes(const GameBodies& bodies, std::size_t contact, std::size_t side, ModePoint& point) const;
+  void add_corners(std::size_t contact, std::size_t side, float sign, ModePoint& point) const;
+  void make_skin_rows(const BodyStates& states, const GameBodies& bodies);
   void begin_rebound(const GameBodies& bodies, const PreparedContact& contact, ContactRow& row) const;
-  void tell(PreparedContact& contact, const Told& told, const SubstepPlan& plan) const;
+  void tell(std::size_t contact, const SubstepPlan& plan);
   /// Of bodies that contacts tie together: what their forces change the energy by, what they may, and what of them is
   /// left.
   struct Works {
@@ -90,7 +86,7 @@ class GameContacts {
     float share = 1.0f;
   };
   Works& works_of(std::int32_t frame) {
-    return frame < 0 ? works_.back() : works_[static_cast<std::size_t>(islands_[static_cast<std::size_t>(frame)])];
+    return frame < 0 ? works_.back() : works_[static_cast<std::size_t>(ties_.root(frame))];
   }
   void add_works(const GameBodies& bodies);
   void scale_forces(GameBodies& bodies, std::span<const double> moved);
@@ -101,11 +97,11 @@ class GameContacts {
   std::vector<Rolling> rolling_memory_;
   std::vector<Rebound> rebound_memory_;
   std::vector<bool> touched_;  // by frame
-  DisjointSets ties_;
-  std::vector<Index> islands_;  // by frame: the first body of those that contacts tie to it
-  std::vector<Works> works_;    // by the first body of an island, and of what does not move
-  std::vector<double> modal_;   // scratch of bodies with skins, as what follows
-  std::vector<Block8> skin_rows_;
+  DisjointSets ties_;          // of frames
+  std::vector<Works> works_;   // by the root of an island, and of what does not move
+  std::vector<double> modal_;  // scratch of bodies with skins
+  std::vector<float> skin_rows_;
+  std::vector<std::size_t> skin_at_;  // by side of a contact, in these
 };
 
 }  // namespace limber::internal

@@ -1,6 +1,7 @@
 #include "pair_bundles.h"
 
 #include <algorithm>
+#include <tuple>
 
 namespace limber::internal {
 namespace {
@@ -62,21 +63,20 @@ void PairBundles::order_by_level() {
   next.assign(begins_.begin(), begins_.end());
   for (const Chunk& chunk : chunks_)
     ordered_[static_cast<std::size_t>(next[static_cast<std::size_t>(chunk.level)]++)] = chunk;
-  // Bodies with as many modes share bundles.
+  // Chunks with as many modes and contacts share bundles.
   for (std::size_t level = 0; level + 1 < begins_.size(); ++level)
     std::sort(ordered_.begin() + begins_[level], ordered_.begin() + begins_[level + 1],
               [](const Chunk& x, const Chunk& y) {
-                return x.width() != y.width() ? x.width() < y.width() : x.first < y.first;
+                return std::tuple(x.width(), x.count, x.first) < std::tuple(y.width(), y.count, y.first);
               });
 }
 
 void PairBundles::pack(const GameBodies& bodies) {
   bundles_.clear();
   lanes_.clear();
-  runs_.clear();
+  levels_.assign(1, 0);
   std::int32_t size = 0, rows = 0, width = 0;
   for (std::size_t level = 0; level + 1 < begins_.size(); ++level) {
-    const std::size_t first = bundles_.size();
     for (std::int32_t begin = begins_[level]; begin < begins_[level + 1]; begin += kBundleLanes) {
       PairBundle& bundle = bundles_.emplace_back();
       bundle.first = size, bundle.rows = rows;
@@ -89,7 +89,7 @@ void PairBundles::pack(const GameBodies& bodies) {
       rows += 3 * bundle.count * (bundle.modes[0] + bundle.modes[1]);
       width = std::max(width, bundle.modes[0] + bundle.modes[1]);
     }
-    add_to_runs(first);
+    levels_.push_back(bundles_.size());
   }
   if (packed_.size() < static_cast<std::size_t>(size)) packed_.resize(static_cast<std::size_t>(size));
   if (rows_.size() < static_cast<std::size_t>(rows)) rows_.resize(static_cast<std::size_t>(rows));
@@ -97,19 +97,9 @@ void PairBundles::pack(const GameBodies& bodies) {
   if (const std::size_t room = bundles_.size() * width_ + 1; room_.size() < room) room_.resize(room);
 }
 
-/// The bundles of a level, the last so far.
-void PairBundles::add_to_runs(std::size_t begin) {
-  const Run level{begin, bundles_.size(), bundles_.size() - begin > kBundlesAtOnce};
-  if (!level.apart && !runs_.empty() && !runs_.back().apart)
-    runs_.back().end = level.end;
-  else
-    runs_.push_back(level);
-}
-
 void PairBundles::empty(std::size_t at) {
   const PairBundle& bundle = bundles_[at];
   std::fill_n(packed_.begin() + bundle.first, bundle.count, BundleContact{});
-  std::fill_n(rows_.begin() + bundle.rows, 3 * bundle.count * (bundle.modes[0] + bundle.modes[1]), Block8{});
 }
 
 void PairBundles::fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBundle& bundle, std::size_t lane) {
@@ -153,15 +143,6 @@ void PairBundles::put(std::size_t contact, const ContactRow& row) {
   bundle.rebounds = true;
   c.rebound.v[lane] = row.rebound, c.fall.v[lane] = row.fall, c.stage.v[lane] = row.stage;
   c.energy.v[lane] = row.energy, c.release.v[lane] = row.release;
-}
-
-void PairBundles::add_modes(std::size_t contact, std::size_t side, std::size_t first, std::span<const Block8> rows) {
-  const Place& place = places_[contact];
-  const PairBundle& bundle = bundles_[static_cast<std::size_t>(place.bundle)];
-  Block8* to = rows_.data() + bundle.rows + 3 * (place.at - bundle.first) * (bundle.modes[0] + bundle.modes[1]) +
-               (side == 0 ? 0 : 3 * bundle.modes[0]) + static_cast<std::ptrdiff_t>(24 * first);
-  for (std::size_t k = 0; k < rows.size(); ++k)
-    for (std::size_t i = 0; i < 8; ++i) to[3 * (8 * (k / 3) + i) + k % 3].v[place.lane] += rows[k].v[i];
 }
 
 float PairBundles::residual() const {

@@ -41,13 +41,12 @@ class PairBundles {
   /// Finds places for the contacts of all pairs: those of a pair stand one after the other. A body that touches itself
   /// is the first of its pair, and its frame stands.
   void arrange(const GameBodies& bodies, std::span<const PreparedContact> contacts);
-  /// Empties all places and visits them: visit(contact), those of a bundle one after the other.
-  template <class Visit>
-  void fill(Jobs& jobs, const Visit& visit);
+  /// Empties all places and visits them: visit(contact), those of a bundle one after the other. Then makes the rows of
+  /// modes: point(contact, side, to be written) tells whether the side has any.
+  template <class Visit, class Point>
+  void fill(Jobs& jobs, const Visit& visit, const Point& point);
   /// Fills the place of a contact, but for its masses and the rows of modes; `rest` is the gap.
   void put(std::size_t contact, const ContactRow& row);
-  /// Adds to the rows of a side's modes. @param first block. @param rows three blocks of each eight
-  void add_modes(std::size_t contact, std::size_t side, std::size_t first, std::span<const Block8> rows);
   /// Gives a contact in its place resistance to rolling. @param radius m, > 0. @param moment N·m, to begin with
   void resist_rolling(std::size_t contact, double radius, const Vec3& moment);
 
@@ -96,16 +95,10 @@ class PairBundles {
     std::int32_t first = 0, count = 0;
     std::int32_t frame = -1;  // one of those that move; −1: none
   };
-  /// Bundles that share no body that moves, or few, which are not worth a second thread.
-  struct Run {
-    std::size_t begin = 0, end = 0;
-    bool apart = false;
-  };
   static constexpr std::size_t kBundlesAtOnce = 4;  // of one thread
   BundleArrays arrays() {
     return {bundles_.data(), packed_.data(), rows_.data(), room_.data(), width_, bundles_.size(), zeros_, standing_};
   }
-  void add_to_runs(std::size_t begin);
   struct Place {
     std::int32_t at = -1, lane = -1, bundle = -1;  // the first in `packed_`
   };
@@ -114,6 +107,8 @@ class PairBundles {
   void pack(const GameBodies& bodies);
   void fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBundle& bundle, std::size_t lane);
   void empty(std::size_t bundle);
+  template <class Point>
+  void fill_modes(std::size_t bundle, const Point& point);
   Vec3 read(std::size_t contact, Block8 (BundleContact::*field)[3]) const;
   double read(std::size_t contact, Block8 BundleContact::*field) const;
   std::int32_t frame_of(std::size_t bundle, std::size_t lane) const {
@@ -132,20 +127,39 @@ class PairBundles {
   std::vector<Chunk> chunks_, ordered_;
   std::vector<std::int32_t> next_level_;  // by frame
   std::vector<std::int32_t> begins_;      // by level, in `ordered_`
-  std::vector<Run> runs_;                 // of bundles, level by level
+  std::vector<std::size_t> levels_;       // where they begin in `bundles_`, and where the last one ends
 };
 
-template <class Visit>
-void PairBundles::fill(Jobs& jobs, const Visit& visit) {
+template <class Visit, class Point>
+void PairBundles::fill(Jobs& jobs, const Visit& visit, const Point& point) {
   const auto part = [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
       empty(b);
       const std::size_t first = b * kBundleLanes;
       for (std::size_t lane = first; lane < first + kBundleLanes; ++lane)
         for (std::int32_t k = 0; k < lanes_[lane].count; ++k) visit(static_cast<std::size_t>(lanes_[lane].first + k));
+      fill_modes(b, point);
     }
   };
   jobs.parallel_for(bundles_.size(), kBundlesAtOnce, std::ref(part));
+}
+
+template <class Point>
+void PairBundles::fill_modes(std::size_t b, const Point& point) {
+  const PairBundle& bundle = bundles_[b];
+  const Lane* lanes = &lanes_[b * kBundleLanes];
+  Block8* rows = rows_.data() + bundle.rows;
+  ModePoint points[kBundleLanes];
+  const ModePoint* given[kBundleLanes];
+  for (std::int32_t k = 0; k < bundle.count; ++k)
+    for (std::size_t side = 0; side < 2; ++side) {
+      for (std::size_t l = 0; l < kBundleLanes; ++l)
+        given[l] = k < lanes[l].count && point(static_cast<std::size_t>(lanes[l].first + k), side, points[l])
+                       ? &points[l]
+                       : nullptr;
+      make_mode_rows(given, bundle.modes[side], rows);
+      rows += 3 * bundle.modes[side];
+    }
 }
 
 template <class Visit>
@@ -173,15 +187,13 @@ void PairBundles::for_all(Jobs& jobs, const Kernel& kernel) {
 template <class Kernel>
 void PairBundles::in_order(Jobs& jobs, bool backward, const Kernel& kernel) {
   if (jobs.concurrency() == 1) return kernel(arrays());
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    const Run& run = runs_[backward ? runs_.size() - 1 - i : i];
-    const auto part = [&](std::size_t begin, std::size_t end) {
-      kernel(arrays().part(run.begin + begin, run.begin + end));
-    };
-    if (run.apart)
-      jobs.parallel_for(run.end - run.begin, kBundlesAtOnce, std::ref(part));
-    else
-      part(0, run.end - run.begin);
+  const auto threads = static_cast<std::size_t>(jobs.concurrency());
+  for (std::size_t i = 0; i + 1 < levels_.size(); ++i) {
+    const std::size_t* level = &levels_[backward ? levels_.size() - 2 - i : i];
+    const auto part = [&](std::size_t begin, std::size_t end) { kernel(arrays().part(*level + begin, *level + end)); };
+    // Few bundles are not worth a second thread.
+    const std::size_t count = level[1] - level[0], share = (count + threads - 1) / threads;
+    jobs.parallel_for(count, std::max(kBundlesAtOnce / 2, share), std::ref(part));
   }
 }
 

@@ -34,6 +34,7 @@
 
 #include "limber/constraints/constraint.h"
 #include "limber/constraints/small_steps.h"
+#include "limber/core/jobs.h"
 #include "limber/dynamics/contact_source.h"
 #include "limber/dynamics/surface_point.h"
 
@@ -163,7 +164,7 @@ class ContactSet {
 
   /// Takes the contacts found at the step's start, in the order of ContactSource.
   void update(const BodyStates& states, std::span<const ContactPoint> contacts,
-              const ContactSurroundings& surroundings = {});
+              const ContactSurroundings& surroundings = {}, Jobs& jobs = serial_jobs());
   /// One for each pair of bodies that have contacts, ordered as they are. Valid until the next update().
   std::span<Constraint* const> constraints() const;
 
