@@ -65,18 +65,25 @@ TEST(Sleep, NobodySleepsUnlessAskedTo) {
   EXPECT_FALSE(scene.world.is_asleep(box));
 }
 
-TEST(Sleep, TheWholeStackWakesWhenItIsHitAndGoesOnWhereItWas) {
+TEST(Sleep, TheWholeStackWakesWhenItIsHit) {
   SleepingStack scene;
   ASSERT_EQ(scene.asleep(), 3);
-  const auto model = damped_box(0, 60.0);
-  const BodyId falling = scene.world.add_body(model, {.pose = {{}, {0.0, 0.0, 1.0}}});
+  scene.world.add_body(damped_box(0, 60.0), {.pose = {{}, {0.0, 0.0, 1.0}}});
   scene.step(5);
   EXPECT_EQ(scene.asleep(), 3) << "it is still far";
   scene.step(20);
   EXPECT_EQ(scene.asleep(), 0);
+}
+
+TEST(Sleep, WhatIsHitFallsAsleepAgainUnderWhatHitIt) {
+  SleepingStack scene(1);
+  const BodyId falling = scene.world.add_body(damped_box(0, 60.0), {.pose = {{}, {0.0, 0.0, 0.6}}});
+  scene.step(25);
+  EXPECT_EQ(scene.asleep(), 0);
   scene.step(300);
-  EXPECT_EQ(scene.asleep(), 3);
+  EXPECT_EQ(scene.asleep(), 1);
   EXPECT_TRUE(scene.world.is_asleep(falling));
+  EXPECT_NEAR(scene.world.body(falling).pose.p.z(), SleepingStack::place(scene.world.model(falling), 1).z(), 1e-2);
 }
 
 TEST(Sleep, WakingChangesNothingAboutWhatStands) {
