@@ -39,6 +39,7 @@ BodyGroup::BodyGroup(std::shared_ptr<const ModalModel> model, double step)
     : model_(required(std::move(model))),
       constants_(model_->data()),
       previous_amplitudes_(model_->modes()),
+      resting_rates_(model_->modes()),
       now_(model_->modes()),
       predicted_(model_->modes()) {
   set_step_length(step);
@@ -120,6 +121,7 @@ void BodyGroup::set_amplitudes(Index slot, std::span<const double> amplitudes, s
   else
     std::copy(rates.begin(), rates.end(), now_.rates.modes(slot).begin());
   previous_amplitudes_.copy_from(now_.amplitudes, slot);
+  resting_rates_.clear(slot);
   forget_static_answer(slot);
 }
 
@@ -185,15 +187,25 @@ void BodyGroup::advance(Index begin, Index end, const Vec3& gravity) {
 }
 
 void BodyGroup::keep_previous_state(Index slot) {
+  resting_rates_.clear(slot);
   if (within_step_) return;
   body(slot).previous_pose = body(slot).frame.pose();
   previous_amplitudes_.copy_from(now_.amplitudes, slot);
 }
 
+double BodyGroup::modal_motion(Index slot) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < rates(slot).size(); ++i) {
+    const double moving = rates(slot)[i] - resting_rates(slot)[i];
+    sum += moving * moving;
+  }
+  return sum;
+}
+
 void BodyGroup::put_to_sleep(Index slot) {
   Body& b = body(slot);
   b.frame.set_velocity(constants_, Vec3::Zero(), Vec3::Zero());
-  now_.rates.clear(slot);
+  for (ModeRows* rows : {&now_.rates, &resting_rates_}) rows->clear(slot);
   find_coupled_velocities(slot);
   b.previous_pose = b.frame.pose();
   previous_amplitudes_.copy_from(now_.amplitudes, slot);
@@ -446,7 +458,8 @@ void BodyGroup::clear_loads(Index slot) {
 void BodyGroup::save_state(Index slot, StateWriter& state) const {
   const Body& b = bodies_[static_cast<std::size_t>(slot)];
   state(b);
-  for (const ModeRows* rows : {&now_.amplitudes, &now_.rates, &previous_amplitudes_}) state.numbers(rows->modes(slot));
+  for (const ModeRows* rows : {&now_.amplitudes, &now_.rates, &previous_amplitudes_, &resting_rates_})
+    state.numbers(rows->modes(slot));
   if (b.modes_loaded) state.numbers(now_.forces.modes(slot));
   if (b.modes_static) state.numbers(now_.answers.modes(slot));
   if (b.held) state.numbers(predicted_.forces.modes(slot));
@@ -455,7 +468,8 @@ void BodyGroup::save_state(Index slot, StateWriter& state) const {
 void BodyGroup::restore_state(Index slot, StateReader& state) {
   Body& b = body(slot);
   state(b);
-  for (ModeRows* rows : {&now_.amplitudes, &now_.rates, &previous_amplitudes_}) state.numbers(rows->modes(slot));
+  for (ModeRows* rows : {&now_.amplitudes, &now_.rates, &previous_amplitudes_, &resting_rates_})
+    state.numbers(rows->modes(slot));
   for (ModeRows* rows : {&now_.forces, &now_.answers}) rows->clear(slot);
   if (b.modes_loaded) state.numbers(now_.forces.modes(slot));
   if (b.modes_static) state.numbers(now_.answers.modes(slot));

@@ -2,7 +2,6 @@
 // twice but where sleepers wake.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "limber/constraints/small_steps.h"
@@ -14,10 +13,6 @@ class GamePath final : public StepPath {
  public:
   using StepPath::StepPath;
 
-  double modal_motion(Index body) const override {
-    const std::optional<double> constrained = solver_.modal_motion(body);
-    return constrained ? *constrained : StepPath::modal_motion(body);
-  }
   void save_state(StateWriter& state) const override;
   void restore_state(StateReader& state) override;
 

@@ -114,11 +114,12 @@ void MotionForecast::expect_steady(Index body, BodyState& state) {
   state.end_pose = {quaternion_from_rotation_vector(state.rotation) * state.pose.q, state.pose.p + state.displacement};
   std::vector<double>& end = end_amplitudes_[static_cast<std::size_t>(body)];
   end.resize(state.amplitudes.size());
-  const std::span<const double> rates = group.rates(e.slot), lambda = group.model().data().eigenvalues;
+  const std::span<const double> rates = group.rates(e.slot), resting = group.resting_rates(e.slot);
+  const std::span<const double> lambda = group.model().data().eigenvalues;
   const std::span<const double> shape = group.model().collision_extent().shape;
   double arm = e.extent.radius, bends = 0.0;
   for (std::size_t i = 0; i < end.size(); ++i) {
-    const double change = rates[i] * std::min(length_, 1.0 / std::sqrt(lambda[i]));
+    const double change = (rates[i] - resting[i]) * std::min(length_, 1.0 / std::sqrt(lambda[i]));
     end[i] = state.amplitudes[i] + change;
     arm += shape[i] * std::abs(state.amplitudes[i]);
     bends += shape[i] * std::abs(change);

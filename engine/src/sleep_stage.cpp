@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "limber/dynamics/body_group.h"
-#include "step_path.h"
 
 namespace limber::internal {
 
@@ -58,8 +57,7 @@ void SleepStage::wake_all() {
   for (std::size_t i = 0; i < rest_.size(); ++i) wake(static_cast<Index>(i));
 }
 
-void SleepStage::update(const SleepOptions& options, double h, const StepPath& path,
-                        std::span<const ContactEvent> events) {
+void SleepStage::update(const SleepOptions& options, double h, std::span<const ContactEvent> events) {
   const std::span<const Index> active = awake();  // as they were before any of them falls asleep here
   for (const Index body : active) {
     Rest& r = rest_[static_cast<std::size_t>(body)];
@@ -72,7 +70,7 @@ void SleepStage::update(const SleepOptions& options, double h, const StepPath& p
   }
   for (const Index body : active) {
     double& calm = rest_[static_cast<std::size_t>(body)].calm;
-    calm = at_rest(body, options, path) ? calm + h : 0.0;
+    calm = at_rest(body, options) ? calm + h : 0.0;
   }
   for (const ConstraintStage::Entry& entry : constraints_->entries())  // hands that go on by themselves
     if (entry.handle && !entry.handle->target().velocity.isZero(0.0))
@@ -91,7 +89,7 @@ void SleepStage::update(const SleepOptions& options, double h, const StepPath& p
   }
 }
 
-bool SleepStage::at_rest(Index body, const SleepOptions& options, const StepPath& path) const {
+bool SleepStage::at_rest(Index body, const SleepOptions& options) const {
   const ConstrainedBody& at = constraints_->states().body(body);
   const BodyGroup& group = *at.group;
   const RigidFrame& frame = group.frame(at.slot);
@@ -99,7 +97,7 @@ bool SleepStage::at_rest(Index body, const SleepOptions& options, const StepPath
   const double radius = group.model().collision_extent().radius;
   const double speed = frame.velocity().norm() + radius * group.angular_velocity(at.slot).norm();
   if (!(speed <= options.speed)) return false;
-  if (!(path.modal_motion(body) <= data.mass * options.speed * options.speed)) return false;
+  if (!(group.modal_motion(at.slot) <= data.mass * options.speed * options.speed)) return false;
   const Rest& r = rest_[static_cast<std::size_t>(body)];
   return (r.push - r.pushed).norm() <= data.mass * options.speed;
 }

@@ -12,8 +12,6 @@
 
 namespace limber::internal {
 
-class StepPath;
-
 class SleepStage {
  public:
   explicit SleepStage(ConstraintStage& constraints) : constraints_(&constraints) {}
@@ -40,8 +38,8 @@ class SleepStage {
   void wake_all();
 
   /// After a step of h: counts who is at rest, and puts islands to sleep that have been for long enough.
-  /// @param path took the step. @param events of the step
-  void update(const SleepOptions& options, double h, const StepPath& path, std::span<const ContactEvent> events);
+  /// @param events of the step
+  void update(const SleepOptions& options, double h, std::span<const ContactEvent> events);
 
   /// Of as many bodies. Their groups and `constraints` know by themselves who sleeps.
   void save_state(std::size_t bodies, StateWriter& state) const;
@@ -67,7 +65,7 @@ class SleepStage {
       return std::tie(s.what, s.sleeper);
     }
   };
-  bool at_rest(Index body, const SleepOptions& options, const StepPath& path) const;
+  bool at_rest(Index body, const SleepOptions& options) const;
   void put_to_sleep(std::span<const Index> members);
 
   ConstraintStage* constraints_;

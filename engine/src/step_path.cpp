@@ -35,11 +35,4 @@ void StepPath::advance(const Substep& substep, StepEvents& events, Jobs& jobs, S
   clock.lap(Stage::kBookkeeping);
 }
 
-double StepPath::modal_motion(Index body) const {
-  const ConstrainedBody& at = constraints_->states().body(body);
-  double sum = 0.0;
-  for (const double rate : at.group->rates(at.slot)) sum += rate * rate;
-  return sum;
-}
-
 }  // namespace limber::internal

@@ -49,9 +49,6 @@ class StepPath {
   /// Sums over the islands of the last substep.
   const IslandReport& report() const { return report_; }
 
-  /// Twice the kinetic energy of a body's modes after a step, beyond that of rest under what acts on them, J.
-  virtual double modal_motion(Index body) const;
-
   /// A body that is removed: what its contacts remember goes with it.
   void forget(Index body) { rows_.set.forget(body); }
   /// The forces that indent a body's collision surface beyond its modes, as the last substep left them.

@@ -321,7 +321,7 @@ void World::step() {
   m.probes.sensors.update();
   if (m.paths.registry.source() != nullptr) m.last.events.end();
   m.last.hits.update(contact_events(), m.options.hit_speed, m.bodies);
-  if (m.options.sleep.enabled) m.sleep.update(m.options.sleep, m.options.step, m.paths.in_force(), contact_events());
+  if (m.options.sleep.enabled) m.sleep.update(m.options.sleep, m.options.step, contact_events());
   m.time.count_step();
   clock.lap(Stage::kBookkeeping, 1);
 }

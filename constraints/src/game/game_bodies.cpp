@@ -463,22 +463,16 @@ void GameBodies::end_step() {
   for (std::size_t at = 0; at < bodies_.size(); ++at) {
     const GameBody& body = bodies_[at];
     if (body.led < 0) show(at);
+    if (body.modes != nullptr) leave_resting_rates(body);
     body.group->end_parts(body.slot);
   }
 }
 
-double GameBodies::modal_motion(std::int32_t at) const {
-  const GameBody& body = bodies_[static_cast<std::size_t>(at)];
-  if (body.modes == nullptr) return 0.0;
+void GameBodies::leave_resting_rates(const GameBody& body) const {
+  const std::span<double> rates = body.group->resting_rates_in_parts(body.slot);
   const Block8* q = &answers_[static_cast<std::size_t>(body.first + 1)];
-  const std::span<const double> rates = body.group->rates(body.slot);
-  double sum = 0.0;
-  for (std::size_t i = 0; i < rates.size(); ++i) {
-    const double moving =
-        rates[i] - static_cast<double>(body.modes->rest_rates()[i]) * static_cast<double>(q[i / 8].v[i % 8]);
-    sum += moving * moving;
-  }
-  return sum;
+  for (std::size_t i = 0; i < rates.size(); ++i)
+    rates[i] = static_cast<double>(body.modes->rest_rates()[i]) * static_cast<double>(q[i / 8].v[i % 8]);
 }
 
 bool GameBodies::all_finite() const {

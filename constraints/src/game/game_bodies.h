@@ -102,8 +102,6 @@ class GameBodies {
 
   /// Writes a force's or torque's part of a row in a frame's coordinates. @param linear, moment world
   void write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const;
-  /// Σ over its modes of (rate − that of rest under the forces of the last substep)², J.
-  double modal_motion(std::int32_t at) const;
   /// Whether all that moves has numbers.
   bool all_finite() const;
 
@@ -128,6 +126,7 @@ class GameBodies {
   FrameLoad load_of(const GameBody& body) const;
   void write_modes(const GameBody& body, std::vector<Block8>& to) const;
   void move_modes(GameBody& body);
+  void leave_resting_rates(const GameBody& body) const;
   void show(std::size_t at);
   RigidTransform pose_of(std::size_t at) const;
   Vec3 momentum_of(std::size_t at) const;

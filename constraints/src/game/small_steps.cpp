@@ -90,12 +90,6 @@ void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const 
   constraints.end_substep(states, bodies, number + 1 == steps.substeps);
 }
 
-std::optional<double> SmallStepSolver::modal_motion(Index body) const {
-  const std::int32_t at = impl_->bodies.of(body);
-  if (at < 0) return std::nullopt;
-  return impl_->bodies.modal_motion(at);
-}
-
 void SmallStepSolver::clear() {
   impl_->contacts.rolling_memory().clear();
   impl_->contacts.rebound_memory().clear();

@@ -21,7 +21,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <span>
 #include <tuple>
 #include <type_traits>
@@ -75,11 +74,6 @@ class SmallStepSolver {
 
   /// Advances the members by one step and tells contacts and constraints what acted. The same bits whatever `jobs` is.
   SmallStepReport step(const SmallStepProblem& problem, Jobs& jobs = serial_jobs());
-
-  /// Twice the kinetic energy of a body's modes after the last step, J, beyond that which steady forces leave in slow
-  /// modes at the end of each substep: 0 where they are at rest. @param body its number in the table
-  /// @returns nothing for a body that was no member
-  std::optional<double> modal_motion(Index body) const;
 
   /// Forgets what it knows of earlier steps beside the contacts' own memory.
   void clear();

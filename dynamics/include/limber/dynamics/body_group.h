@@ -193,6 +193,12 @@ class BodyGroup {
   RigidFrame& frame_in_parts(Index slot) { return body(slot).frame; }
   std::span<double> amplitudes_in_parts(Index slot) { return now_.amplitudes.modes(slot); }
   std::span<double> rates_in_parts(Index slot) { return now_.rates.modes(slot); }
+  /// The part of rates() that would be left if the modes rested under what acted on them in the last part: a force that
+  /// comes as an impulse a part leaves them falling at its end. Zero after a step that was not taken in parts.
+  std::span<const double> resting_rates(Index slot) const { return resting_rates_.modes(slot); }
+  std::span<double> resting_rates_in_parts(Index slot) { return resting_rates_.modes(slot); }
+  /// Twice the kinetic energy of the modes beyond that, J.
+  double modal_motion(Index slot) const;
   void end_parts(Index slot) { clear_loads(slot); }
 
   /// Changes the velocities of frame and modes at once. @param impulse N·s, world. @param moment about the body origin,
@@ -348,9 +354,10 @@ class BodyGroup {
                        std::span<const double> answer, const Vec3& gravity) const;
   Vec3 first_moment_of(std::span<const double> z) const;
   Vec3 first_moment_at_end(const ExactMotion& motion) const;
-  std::array<ModeRows*, 9> mode_rows() {
-    return {&now_.amplitudes,       &now_.rates,       &now_.forces,       &now_.answers,      &previous_amplitudes_,
-            &predicted_.amplitudes, &predicted_.rates, &predicted_.forces, &predicted_.answers};
+  std::array<ModeRows*, 10> mode_rows() {
+    return {&now_.amplitudes,      &now_.rates,        &now_.forces,           &now_.answers,
+            &previous_amplitudes_, &resting_rates_,    &predicted_.amplitudes, &predicted_.rates,
+            &predicted_.forces,    &predicted_.answers};
   }
 
   std::shared_ptr<const ModalModel> model_;
@@ -370,7 +377,7 @@ class BodyGroup {
   std::vector<std::unique_ptr<CoupledMotion>> coupled_;  // by slot; null: not coupled
   std::vector<Index> vacant_;
   bool within_step_ = false;
-  ModeRows previous_amplitudes_;
+  ModeRows previous_amplitudes_, resting_rates_;
   ModalState now_, predicted_;
   std::vector<Prediction> predictions_;
 };
