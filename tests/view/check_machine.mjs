@@ -49,7 +49,7 @@ async function showsContacts(page) {
   });
   const seen = () => page.evaluate(() => {
     const { marks } = globalThis.limber.panel, count = ({ geometry, visible }) => (visible ? geometry.attributes.position?.count ?? 0 : 0);
-    return { points: count(marks.points), ends: count(marks.forces), wires: marks.wires.visible ? marks.wires.children.length : 0,
+    return { points: count(marks.points), ends: count(marks.forces), wires: marks.group.visible ? marks.wires.length : 0,
       contacts: globalThis.limber.engine.contacts().length / 6, axes: globalThis.limber.stage.joints.visible };
   });
   await steps(page, 150);

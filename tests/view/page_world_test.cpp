@@ -11,6 +11,7 @@
 #include "limber/core/error.h"
 #include "limber/core/file.h"
 #include "limber/core/stage_times.h"
+#include "limber/dynamics/reconstruct.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/run.h"
 #include "limber/view/page_file.h"
@@ -56,41 +57,45 @@ TEST_F(PageWorldTest, LeftAloneItIsTheSceneThatSimulatePlays) {
   EXPECT_EQ(page.state_hash(), run_scene(told, load_models(told), {.steps = 50}).state_hash);
 }
 
-/// The shader's sum, here in double precision, against the engine's own surface.
-TEST_F(PageWorldTest, ModelAndFrameGiveTheSurfaceThatTheEngineReconstructs) {
+TEST_F(PageWorldTest, ABentSurfaceAndAFrameGiveWhatTheEngineReconstructs) {
   PageWorld page(scene());
   step(page, 40);
   page.show_mode(0, 1, 0.2);
-  const PageModel& model = page.models()[0];
-  const std::size_t vertices = model.rest.size() / 3;
+  const std::size_t vertices = page.models()[0].rest.size() / 3;
   const std::span<const float> frame = page.frame();
   const RigidTransform X{.q = normalized(Quaternion{frame[3], frame[4], frame[5], frame[6]}),
                          .p = {frame[0], frame[1], frame[2]}};
-  std::vector<float> positions(3 * vertices);
+  std::vector<float> positions(3 * vertices), normals(3 * vertices);
   page.reconstruct(0, positions.data());
+  vertex_normals(testing::block_data(kModes).render.triangles, positions, normals);
+  const PageSurface bent = page.bent(0, 0.0);
+  ASSERT_EQ(bent.modes, 2);
+  ASSERT_EQ(bent.positions.size(), positions.size());
   for (std::size_t v = 0; v < vertices; ++v) {
-    Vec3 x(model.rest[3 * v], model.rest[3 * v + 1], model.rest[3 * v + 2]);
-    for (std::size_t i = 0; i < kModes; ++i) {
-      const float* shape = &model.shapes[8 * (i * vertices + v)];
-      x += static_cast<double>(frame[7 + i]) * Vec3(shape[0], shape[1], shape[2]);
-    }
-    const Vec3 expected(positions[3 * v], positions[3 * v + 1], positions[3 * v + 2]);
-    EXPECT_LT((X * x - expected).norm(), 1e-6) << v;  // m, of a block of 2 m in single precision
+    const auto at = [v](std::span<const float> of) { return Vec3(of[3 * v], of[3 * v + 1], of[3 * v + 2]); };
+    EXPECT_LT((X * at(bent.positions) - at(positions)).norm(), 1e-6) << v;  // m, of a block of 2 m in single precision
+    EXPECT_LT((X.q * at(bent.normals) - at(normals)).norm(), 1e-5) << v;
   }
 }
 
-TEST_F(PageWorldTest, NormalsFollowTheSurfaceToFirstOrder) {
-  const PageWorld page(scene());
-  const PageModel& model = page.models()[0];
-  const std::size_t vertices = model.rest.size() / 3;
-  // A block that bends in y: where its side looks along y, n_x changes by −du_y/dx.
-  for (std::size_t v = 0; v < vertices; ++v) {
-    const float* shape = &model.shapes[8 * v];
-    const float* normal = &model.normals[3 * v];
-    const double along = static_cast<double>(normal[0] * shape[4] + normal[1] * shape[5] + normal[2] * shape[6]);
-    if (std::abs(std::abs(model.rest[3 * v]) - 1.0f) < 1e-3f) continue;  // an end: three sides meet there
-    EXPECT_NEAR(along, 0.0, 1e-5) << "a turn does not change the length of a normal";
+TEST_F(PageWorldTest, ASurfaceIsBentByNoMoreModesThanOneSees) {
+  PageWorld page(scene());
+  EXPECT_EQ(page.bent(0, 0.0).modes, 0) << "at rest";
+  page.poke(page.cast_ray({-10, 0.1, 0.9}, {1, 0, 0}), {1, 0.3, 0.2});
+  step(page, 3);
+  const PageSurface all = page.bent(0, 0.0);
+  ASSERT_EQ(all.modes, kModes);
+  const std::vector<float> exact(all.positions.begin(), all.positions.end());
+  bool fewer = false;
+  for (double tolerance = 1.0; tolerance > 1e-7; tolerance *= 0.5) {
+    const PageSurface seen = page.bent(0, tolerance);
+    fewer = fewer || (seen.modes > 0 && seen.modes < kModes);
+    const std::span<const float> drawn = seen.modes > 0 ? seen.positions : std::span(page.models()[0].rest);
+    for (std::size_t i = 0; i < exact.size(); i += 3)
+      EXPECT_LE(std::hypot(drawn[i] - exact[i], drawn[i + 1] - exact[i + 1], drawn[i + 2] - exact[i + 2]),
+                tolerance + 1e-6);
   }
+  EXPECT_TRUE(fewer);
 }
 
 TEST_F(PageWorldTest, ARayMeetsTheNearestBody) {

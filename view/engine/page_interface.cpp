@@ -28,6 +28,7 @@ PageHit hit;
 std::span<const double> ray, blows;
 double answer[16];
 std::span<const double> contacts;
+limber::PageSurface bent;
 
 template <class F>
 int guarded(F&& work) {
@@ -69,17 +70,14 @@ EMSCRIPTEN_KEEPALIVE const char* page_description() {
   return guarded([] { text = page->description(); }) != 0 ? text.c_str() : "";
 }
 
-// Data of model i: 0 rest, 1 normals, 2 shapes (floats), 3 triangles (32 bits each); 4 to 7: of the surface that
-// touches.
+// Data of model i: 0 rest, 1 normals (floats), 2 triangles (32 bits each); 3 to 5: of the surface that touches.
 EMSCRIPTEN_KEEPALIVE const void* page_model_data(int model, int what) {
-  const limber::PageModel& m = what < 4 ? page->models()[static_cast<std::size_t>(model)] : page->touching(model);
-  switch (what % 4) {
+  const limber::PageModel& m = what < 3 ? page->models()[static_cast<std::size_t>(model)] : page->touching(model);
+  switch (what % 3) {
     case 0:
       return m.rest.data();
     case 1:
       return m.normals.data();
-    case 2:
-      return m.shapes.data();
     default:
       return m.triangles.data();
   }
@@ -91,6 +89,15 @@ EMSCRIPTEN_KEEPALIVE const double* page_touching_size(int model) {
   answer[0] = drawn ? 0.0 : static_cast<double>(m.rest.size() / 3);
   answer[1] = drawn ? 0.0 : static_cast<double>(m.triangles.size() / 3);
   return answer;
+}
+
+// The surface of a body as it is bent (PageWorld::bent()): by how many modes, and until the next 0 positions, 1 normals.
+EMSCRIPTEN_KEEPALIVE int page_bend(int body, double tolerance, int touching) {
+  bent = page->bent(body, tolerance, touching != 0);
+  return static_cast<int>(bent.modes);
+}
+EMSCRIPTEN_KEEPALIVE const float* page_bent(int what) {
+  return what == 0 ? bent.positions.data() : bent.normals.data();
 }
 
 EMSCRIPTEN_KEEPALIVE int page_set_live(const double* settings) {

@@ -7,8 +7,8 @@
 
 namespace limber::internal {
 
-/// @param surface of the model: what is drawn, or what touches
-PageModel page_model(const ModalModel& model, const ModalSurface& surface);
+/// @param surface of the model: what is drawn, or what touches. @param extent of it
+PageModel page_model(const ModalModel& model, const ModalSurface& surface, const SurfaceExtent& extent);
 
 /// With the first modes alone, and other damping. Residual compliance answers for those left out.
 std::shared_ptr<const ModalModel> with_settings(const std::shared_ptr<const ModalModel>& model,

@@ -1,6 +1,7 @@
 #include "limber/view/page_world.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -12,6 +13,7 @@
 #include "limber/core/error.h"
 #include "limber/core/stage_times.h"
 #include "limber/core/state_archive.h"
+#include "limber/dynamics/reconstruct.h"
 #include "limber/scene/recording.h"
 #include "limber/scene/scene_player.h"
 #include "page_history.h"
@@ -102,6 +104,7 @@ struct PageWorld::Impl {
   internal::PageSound sound;
   struct {
     std::vector<float> frame;
+    std::array<std::vector<float>, 2> bent;
     std::vector<double> numbers, joint_frames, joint_wishes, contacts, sensor_counts, ray_places, amplitudes,
         stage_seconds = std::vector<double>(kStages, 0.0);
     std::map<int, PageModel> touching;
@@ -125,7 +128,7 @@ void PageWorld::Impl::start() {
     const auto [found, fresh] = kind_of.emplace(model.get(), static_cast<int>(kinds.size()));
     if (fresh) {
       kinds.push_back(internal::with_settings(model, settings));
-      shown.push_back(internal::page_model(*kinds.back(), kinds.back()->render()));
+      shown.push_back(internal::page_model(*kinds.back(), kinds.back()->render(), kinds.back()->render_extent()));
       const std::shared_ptr<const SoundModes>& heard = models.sound_of_body[kind_of_body.size()];
       if (heard && heard->modes() > 0) shown.back().sound = heard;
     }
@@ -162,7 +165,24 @@ const PageModel& PageWorld::touching(int model) {
   if (!kind.data().collision) return m.shown[static_cast<std::size_t>(model)];
   const auto found = m.told_to_page.touching.find(model);
   if (found != m.told_to_page.touching.end()) return found->second;
-  return m.told_to_page.touching.emplace(model, internal::page_model(kind, kind.collision())).first->second;
+  return m.told_to_page.touching
+      .emplace(model, internal::page_model(kind, kind.collision(), kind.collision_extent()))
+      .first->second;
+}
+PageSurface PageWorld::bent(int body, double tolerance, bool touching) {
+  Impl& m = *impl_;
+  const ModalModel& model = m.world().model(m.id(body));
+  const std::span<const double> z = m.world().body(m.id(body)).amplitudes;
+  const Index modes = drawn_modes(touching ? model.collision_extent() : model.render_extent(), z, tolerance);
+  if (modes == 0) return {};
+  const ModalSurface& surface = touching ? model.collision() : model.render();
+  auto& [positions, normals] = m.told_to_page.bent;
+  positions.resize(3 * surface.rest.size());
+  normals.resize(positions.size());
+  const ReconstructionTarget target{
+      .amplitudes = z.data(), .positions = positions.data(), .normals = normals.data(), .modes = modes};
+  limber::reconstruct(surface, std::span(&target, 1));
+  return {modes, positions, normals};
 }
 const World& PageWorld::world() const { return impl_->world(); }
 PageSettings PageWorld::settings() const { return impl_->settings; }

@@ -45,19 +45,24 @@ export class Engine {
   /** The surface by which bodies of a model touch; null: the drawn one. */
   touching(i) {
     const [vertices, triangles] = this.doubles(this.module._page_touching_size(i), 2);
-    return vertices === 0 ? null : this.surface(i, 4, vertices, triangles);
+    return vertices === 0 ? null : this.surface(i, 3, vertices, triangles);
   }
   surface(i, first, vertices, triangles) {
-    const modes = this.scene.models[i].frequencies.length, data = (what) => this.module._page_model_data(i, first + what);
-    const corners = data(3) / 4;
+    const data = (what) => this.module._page_model_data(i, first + what), corners = data(2) / 4;
     return {
       rest: this.floats(data(0), 3 * vertices),
       normals: this.floats(data(1), 3 * vertices),
-      shapes: this.floats(data(2), 8 * vertices * modes),
       triangles: this.module.HEAPU32.slice(corners, corners + 3 * triangles),
-      vertices,
-      modes,
     };
+  }
+  /**
+   * A body's surface in its own frame, off by no more than the tolerance, m. @param touching that by which it touches
+   * @return {positions, normals} until the next call of the engine; null: it is at rest
+   */
+  bent(body, tolerance, touching, vertices) {
+    if (this.module._page_bend(body, tolerance, touching ? 1 : 0) === 0) return null;
+    const floats = (what) => new Float32Array(this.module.HEAPF32.buffer, this.module._page_bent(what), 3 * vertices);
+    return { positions: floats(0), normals: floats(1) };
   }
 
   writeSettings(s) {

@@ -2,7 +2,7 @@
 import * as THREE from 'three';
 import { element } from './dom.js';
 import { setLines } from './stage.js';
-import { bending, SurfaceModel } from './surface.js';
+import { BendingMesh, SurfaceModel } from './surface.js';
 
 const WEIGHT = 0.12;   // of the scene's size, for a force of the heaviest body's weight
 const LONGEST = 0.6;   // of the scene's size
@@ -18,8 +18,9 @@ export class Marks {
       new THREE.PointsMaterial({ color: COLOUR, size: 6, sizeAttenuation: false, depthTest: false, transparent: true }));
     this.points.renderOrder = 2;
     this.points.frustumCulled = false;
-    this.wires = new THREE.Group();
-    stage.scene.add(this.points, this.wires);
+    this.group = new THREE.Group();
+    this.wires = [];  // by body, as far as they were asked for: {surface, touching, bends}
+    stage.scene.add(this.points, this.group);
     this.models = new Map();  // what touches, by model, as far as it was asked for
   }
 
@@ -33,8 +34,9 @@ export class Marks {
 
   /** Models are others. */
   forget() {
-    this.wires.clear();
-    for (const model of this.models.values()) model.dispose();
+    this.group.clear();
+    for (const { surface } of this.wires.splice(0)) surface.dispose();
+    for (const model of this.models.values()) model?.dispose();
     this.models.clear();
   }
 
@@ -43,7 +45,7 @@ export class Marks {
     stage.joints.visible &&= this.shown.joints;
     this.showContacts(this.shown.contacts ? engine.contacts() : [], stage.size, Math.max(0, ...engine.scene.models.map(({ mass }) => mass)));
     if (this.shown.touching) this.wire(stage, engine);
-    this.wires.visible = this.shown.touching;
+    this.group.visible = this.shown.touching;
   }
 
   showContacts(contacts, size, mass) {
@@ -64,36 +66,37 @@ export class Marks {
   /** One wire per body, as many as there are bodies now. */
   wire(stage, engine) {
     const { bodies } = engine.scene;
-    while (this.wires.children.length > bodies.length) this.wires.remove(this.wires.children.at(-1));
-    for (let i = this.wires.children.length; i < bodies.length; ++i) this.wires.add(this.made(stage, engine, i));
-    this.wires.children.forEach((mesh, i) => {
-      mesh.position.copy(stage.bodies[i].mesh.position);
-      mesh.quaternion.copy(stage.bodies[i].mesh.quaternion);
+    for (const wire of this.wires.splice(bodies.length)) this.group.remove(wire.surface.mesh), wire.surface.dispose();
+    for (let i = this.wires.length; i < bodies.length; ++i) {
+      this.wires.push(this.made(stage, engine, bodies[i]));
+      this.group.add(this.wires[i].surface.mesh);
+    }
+    this.wires.forEach(({ surface, touching, bends }, i) => {
+      surface.mesh.position.copy(stage.bodies[i].mesh.position);
+      surface.mesh.quaternion.copy(stage.bodies[i].mesh.quaternion);
+      if (bends) surface.set(engine.bent(i, stage.unseen(i), touching, surface.vertices));
     });
   }
 
-  made(stage, engine, i) {
-    const { shape, model } = engine.scene.bodies[i];
+  made(stage, engine, { shape, model }) {
     const material = new THREE.MeshBasicMaterial({ color: 0x1d2430, wireframe: true, transparent: true, opacity: 0.45, depthTest: false });
-    const mesh = shape ? new THREE.Mesh(rigid(shape), material) : this.bent(stage, engine, i, model, material);
-    mesh.renderOrder = 1;
-    mesh.frustumCulled = false;
-    return mesh;
+    const own = shape ? new SurfaceModel(rigid(shape)) : this.model(engine, model);
+    const surface = new BendingMesh(own ?? stage.models[model], material);
+    surface.mesh.renderOrder = 1;
+    return { surface, touching: own !== null, bends: !shape };
   }
 
-  bent(stage, engine, i, number, material) {
+  /** The surface by which a model touches; null: the drawn one. */
+  model(engine, number) {
     if (!this.models.has(number)) {
       const told = engine.touching(number);
-      if (told) this.models.set(number, new SurfaceModel(told));
+      this.models.set(number, told && new SurfaceModel(told));
     }
-    const model = this.models.get(number) ?? stage.models[number];
-    return new THREE.Mesh(model.geometry, bending(material, model, stage.bodies[i].amplitudes));
+    return this.models.get(number);
   }
 }
 
+/** A shape's surface as models have theirs, without normals. */
 function rigid({ points, triangles }) {
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
-  geometry.setIndex(triangles);
-  return geometry;
+  return { rest: Float32Array.from(points), normals: new Float32Array(points.length), triangles: Uint32Array.from(triangles) };
 }

@@ -5,6 +5,7 @@ import { NARROW } from './dom.js';
 import { SurfaceBody, SurfaceModel } from './surface.js';
 
 const UP = new THREE.Vector3(0, 0, 1);
+const UNSEEN = 0.25;  // of a pixel
 
 export class Stage {
   constructor(canvas) {
@@ -80,15 +81,33 @@ export class Stage {
     const frame = engine.frame();
     let at = 0;
     this.bodies.forEach((body, i) => {
-      body.set(frame.subarray(at, at + engine.sizes[i]));
+      body.place(frame.subarray(at, at + engine.sizes[i]));
       at += engine.sizes[i];
     });
     this.goAlong();
+    this.bend(engine, frame);
     this.drawJoints(engine);
     engine.sensorCounts().forEach((count, i) => this.sensors.children[i].material.color.set(count > 0 ? 0xd9822b : 0x2f7d5b));
     const hand = engine.hand();
     setLines(this.hand, hand.holds ? [...hand.point, ...hand.target] : []);
     return hand;
+  }
+
+  /** Bodies by so few modes that no vertex is seen to be off. */
+  bend(engine, frame) {
+    let at = 0;
+    this.bodies.forEach((body, i) => {
+      const tolerance = this.unseen(i);
+      body.bend(frame.subarray(at, at + engine.sizes[i]), tolerance, () => engine.bent(i, tolerance, false, body.surface.vertices));
+      at += engine.sizes[i];
+    });
+  }
+
+  /** m, by which a vertex of a body may be off unseen: a part of a pixel where the body is nearest. */
+  unseen(body) {
+    const { mesh, surface } = this.bodies[body];
+    const nearest = Math.max(this.camera.near, this.camera.position.distanceTo(mesh.position) - surface.model.radius);
+    return UNSEEN * 2 * nearest * Math.tan(0.5 * THREE.MathUtils.degToRad(this.camera.fov)) / this.renderer.domElement.height;
   }
 
   follow(body) { this.followed = { body, position: this.bodies[body].mesh.position.clone() }; }

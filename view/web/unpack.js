@@ -31,21 +31,29 @@ function unpacked(bytes) {
   const out = new Uint8Array(heads.reduce((sum, { size }) => sum + size, 0));
   let from = 8 + 12 * heads.length, to = 0;
   for (const { kind, size, exponent } of heads) {
-    const count = size / 4;
-    if (kind === 0) out.set(bytes.subarray(from, from + size), to);
-    if (kind === 1) out.set(new Uint8Array(summed(bytes, from, count, 4).buffer), to);
-    if (kind === 2) out.set(new Uint8Array(Float32Array.from(new Int16Array(summed(bytes, from, count, 2).buffer), (q) => q * 2 ** exponent).buffer), to);
-    from += kind === 2 ? 2 * count : size;
+    const packed = bytes.subarray(from, from + (kind === 2 ? size / 2 : size));
+    const part = kind === 0 ? packed : kind === 1 ? words(packed) : halves(packed, 2 ** exponent);
+    out.set(new Uint8Array(part.buffer, part.byteOffset, size), to);
+    from += packed.length;
     to += size;
   }
   return out;
 }
 
-/** Whole numbers, each told less the third before it, lowest bytes of all first. */
-function summed(bytes, from, count, width) {
-  const out = width === 4 ? new Uint32Array(count) : new Uint16Array(count);
-  for (let byte = 0; byte < width; ++byte)
-    for (let i = 0; i < count; ++i) out[i] |= bytes[from + byte * count + i] << (8 * byte);
-  for (let i = 3; i < count; ++i) out[i] += out[i - 3];
+// Whole numbers, each told less the third before it, lowest bytes of all first.
+function words(packed) {
+  const count = packed.length / 4, out = new Uint32Array(count);
+  for (let i = 0; i < count; ++i) {
+    const before = i < 3 ? 0 : out[i - 3];
+    out[i] = before + (packed[i] | packed[count + i] << 8 | packed[2 * count + i] << 16 | packed[3 * count + i] << 24);
+  }
+  return out;
+}
+function halves(packed, scale) {
+  const count = packed.length / 2, sums = new Int16Array(count), out = new Float32Array(count);
+  for (let i = 0; i < count; ++i) {
+    sums[i] = (i < 3 ? 0 : sums[i - 3]) + (packed[i] | packed[count + i] << 8);
+    out[i] = sums[i] * scale;
+  }
   return out;
 }

@@ -33,19 +33,22 @@ struct PageSettings {
   double joint_friction = 1.0;                   ///< factor on the friction in joints; ≥ 0
 };
 
-/// A model once for all its bodies, made for a vertex shader.
+/// A model once for all its bodies.
 struct PageModel {
   std::string name{};
   double mass = 0.0;                       ///< kg
   std::vector<float> rest{}, normals{};    ///< 3 V each: of the rest shape, m; unit
   std::vector<std::uint32_t> triangles{};  ///< 3 T
-  /// 8 V k: for mode i and vertex v from 8 (i V + v) on the shape (kg^−½), 0, and how the normal, of length 1 at rest,
-  /// changes to first order, 0.
-  std::vector<float> shapes{};
   std::vector<double> frequencies{};  ///< Hz, k
   /// The amplitude at which a mode moves some vertex by a tenth of the model's size, k.
   std::vector<double> visible_amplitudes{};
   std::shared_ptr<const SoundModes> sound{};  ///< null: one does not hear it
+};
+
+/// A surface as it is drawn, in its body's frame.
+struct PageSurface {
+  Index modes = 0;                                ///< by so many of the first; 0: it is at rest, and nothing follows
+  std::span<const float> positions{}, normals{};  ///< 3 V each
 };
 
 /// The first point of any body that moves, as contact has it, which a ray meets within 10 km: World::cast_ray().
@@ -68,6 +71,9 @@ class PageWorld {
   const std::vector<PageModel>& models() const;
   /// The surface by which bodies of a model touch, unless they wear a shape; that of models() where there is no other.
   const PageModel& touching(int model);
+  /// A body's surface, drawn or touching, by as few modes as put no vertex off by more than the tolerance, m
+  /// (drawn_modes()).
+  PageSurface bent(int body, double tolerance, bool touching = false);
   const World& world() const;
 
   PageSettings settings() const;
