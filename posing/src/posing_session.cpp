@@ -257,6 +257,11 @@ bool PosingSession::undo() {
   return true;
 }
 
+void PosingSession::forget_changes() {
+  impl_->before.clear();
+  impl_->last_moved = -1;
+}
+
 PoseResult PosingSession::solve() {
   if (impl_->method != nullptr) return impl_->solve_by_method();
   if (!impl_->solver) impl_->solver.emplace(impl_->now.built->structure, impl_->options, impl_->handle_terms());

@@ -64,6 +64,37 @@ async function isPulled(page) {
   check(Math.abs(turn(beyond)) < 1.0 + 1e-6, `the limit holds, ${turn(beyond)} rad`);
 }
 
+/** A line across a part cuts it in two, on a ball; undone, it is one again. */
+async function isCut(page) {
+  await page.locator('#panel button:has-text("Back to rest")').click();
+  await settled(page);
+  const ends = await page.evaluate(() => {
+    const { stage } = globalThis.limber, canvas = stage.renderer.domElement.getBoundingClientRect();
+    stage.camera.updateMatrixWorld();
+    return [-0.3, 0.5].map((z) => {
+      const p = stage.controls.target.clone().set(1.5, 0.1, z).project(stage.camera);
+      return [canvas.left + (p.x + 1) * 0.5 * canvas.width, canvas.top + (1 - p.y) * 0.5 * canvas.height];
+    });
+  });
+  const look = () => page.evaluate(() => {
+    const { engine, geometry, mesh } = globalThis.limber;
+    return { parts: engine.scene.parts.length, joints: engine.scene.joints.map(({ type }) => type), groups: geometry.groups.length, materials: mesh.material.length };
+  });
+  const before = await look();
+  await page.locator('#panel button:has-text("Cut")').click();
+  await page.mouse.move(...ends[0]);
+  await page.mouse.down();
+  await page.mouse.move(...ends[1], { steps: 3 });
+  await page.mouse.up();
+  const cut = await look();
+  check(cut.parts === before.parts + 1 && cut.groups === cut.parts && cut.materials === cut.parts, `a line across a part makes two of it: ${JSON.stringify(cut)}`);
+  check(cut.joints.at(-1) === 'ball' && cut.joints.length === before.joints.length + 1, 'with a ball between');
+  const rest = await settled(page), pulled = await pull(page, await onScreen(page, cut.parts - 1), [0, -60]);
+  check(moved(pulled, rest) > 0.02 && pulled.jointError < 1e-6, `the piece is pulled, by ${moved(pulled, rest)}, and hangs on its joint`);
+  for (let tries = 0; tries < 20 && (await look()).parts > before.parts; ++tries) await page.locator('#panel button:has-text("Undo")').click();
+  check(JSON.stringify(await look()) === JSON.stringify(before), 'and undone');
+}
+
 async function isEdited(page) {
   await page.locator('#panel summary:has-text("<b>base</b>")').click();
   const high = page.locator('#panel label.ends input').nth(0), low = page.locator('#panel label.ends input').nth(1);
@@ -113,6 +144,7 @@ await run('check_pose', file, async () => {
     await isEdited(page);
     await bends(page);
     await isSaved(page);
+    await isCut(page);
     check((await page.evaluate(() => document.querySelectorAll('img, iframe, object, embed, b').length)) === 0, 'no text has become markup');
   }
   await page.close();

@@ -6,6 +6,8 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
 
 #include "limber/core/error.h"
 #include "limber/core/file.h"
@@ -126,6 +128,62 @@ TEST_F(PagePoseTest, ASoftPartBendsAndItsJointHolds) {
   const PoseResult found = settle(pose);
   EXPECT_LT(found.joint_error, 1e-9);
   EXPECT_GT(pose.handles()[2], 0.4) << "its tip has gone up";
+}
+
+/// From above, across the arm at x, from beside to `end`.
+PoseStroke across_arm(double x, double end = 0.5) {
+  const Vec3 eye(x, 0.1, 5.0);
+  return {eye, Vec3(x, -0.3, 0.2) - eye, Vec3(x, end, 0.2) - eye};
+}
+double area(const SurfaceMesh& surface) {
+  double sum = 0.0;
+  for (const Triangle& t : surface.triangles) {
+    const auto at = [&](std::size_t k) { return surface.vertices[static_cast<std::size_t>(t[k])]; };
+    sum += 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
+  }
+  return sum;
+}
+
+TEST_F(PagePoseTest, ACutMakesAPartOfItsOwnOnABall) {
+  PagePose pose = page();
+  EXPECT_FALSE(pose.undo()) << "nothing was done yet";
+  const double whole = area(pose.session().model().surface);
+  const std::string before = pose.description();
+  pose.cut(1, across_arm(1.6));
+  ASSERT_EQ(told(pose)["parts"].size(), 3u);
+  ASSERT_EQ(told(pose)["joints"].size(), 2u);
+  EXPECT_EQ(told(pose)["joints"][1]["type"], "ball");
+  const JointedModel& model = pose.session().model();
+  EXPECT_NEAR(area(model.surface), whole, 1e-12);
+  std::set<std::pair<Index, Index>> edges;
+  for (const Triangle& t : model.surface.triangles)
+    for (std::size_t k = 0; k < 3; ++k) edges.emplace(t[k], t[(k + 1) % 3]);
+  EXPECT_EQ(edges.size(), 3 * model.surface.triangles.size());
+  for (const auto& [a, b] : edges) EXPECT_TRUE(edges.contains({b, a})) << "closed, " << a << ' ' << b;
+  EXPECT_LT((model.joints[1].joint.frame.origin - Vec3(1.6, 0.1, 0.1)).norm(), 1e-9);
+  for (std::size_t p = 1; p < 3; ++p)  // one on each side of the cut
+    for (const Index t : model.parts[p].triangles)
+      for (const Index v : model.surface.triangles[static_cast<std::size_t>(t)])
+        EXPECT_GE((p == 1 ? -1.0 : 1.0) * (model.surface.vertices[static_cast<std::size_t>(v)].x() - 1.6), -1e-9);
+  EXPECT_EQ(model.joints[0].b, 1) << "the hinge stays with what is beside it";
+
+  ASSERT_TRUE(pose.grab(tip(pose)));
+  pose.drag_to({1.6, 0.5, 0.2});
+  const PoseResult found = settle(pose);
+  EXPECT_LT(found.joint_error, 1e-6);
+  EXPECT_LT(found.handle_error, 0.1);
+  while (told(pose)["parts"].size() == 3) ASSERT_TRUE(pose.undo());
+  EXPECT_EQ(pose.description(), before);
+  EXPECT_FALSE(pose.undo());
+}
+
+TEST_F(PagePoseTest, ACutThatEndsInsideIsRefused) {
+  PagePose pose = page();
+  const std::string before = pose.description();
+  EXPECT_THROW(pose.cut(1, across_arm(1.6, 0.1)), InvalidArgument);
+  EXPECT_THROW(pose.cut(1, across_arm(9.0)), InvalidArgument);
+  EXPECT_THROW(pose.cut(7, across_arm(1.6)), InvalidArgument);
+  EXPECT_EQ(pose.description(), before);
 }
 
 TEST_F(PagePoseTest, APoseIsSavedAsAModelOfItsOwn) {

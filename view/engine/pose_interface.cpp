@@ -79,6 +79,11 @@ EMSCRIPTEN_KEEPALIVE int pose_set_soft(int part, int soft) {
 EMSCRIPTEN_KEEPALIVE int pose_set_joint(int joint, const char* told) {
   return safely([&] { pose->set_joint(static_cast<Index>(joint), told); });
 }
+// Cuts the part of the last hit: the eye, and directions to both ends of the stroke.
+EMSCRIPTEN_KEEPALIVE int pose_cut(double x, double y, double z, double fx, double fy, double fz, double tx, double ty,
+                                  double tz) {
+  return safely([&] { pose->cut(pose_hit.part, {{x, y, z}, {fx, fy, fz}, {tx, ty, tz}}); });
+}
 EMSCRIPTEN_KEEPALIVE int pose_undo() { return pose->undo() ? 1 : 0; }
 EMSCRIPTEN_KEEPALIVE void pose_reset() { pose->reset(); }
 

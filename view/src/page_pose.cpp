@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <tuple>
+#include <utility>
 
+#include "cut_part.h"
 #include "limber/articulation/joints_file.h"
 #include "limber/core/error.h"
 #include "limber/internal/joint_spec_json.h"
@@ -46,14 +49,22 @@ Mat3 axes_for(const JointSpec& joint, JointType type) {
 }  // namespace
 
 struct PagePose::Impl {
-  explicit Impl(JointedModel model, std::string told)
-      : session(std::move(model), {.max_iterations = kIterations, .starts = 0}), name(std::move(told)) {
+  explicit Impl(JointedModel model, std::string told) : session(session_of(std::move(model))), name(std::move(told)) {
+    session.set_pinned(0, true);
+    session.forget_changes();
+    list_triangles();
+    place();
+  }
+
+  static PosingSession session_of(JointedModel model) {
+    return PosingSession(std::move(model), {.max_iterations = kIterations, .starts = 0});
+  }
+  void list_triangles() {
+    triangles.clear();
     for (const ModelPart& part : session.model().parts)
       for (const Index t : part.triangles)
         for (const Index v : session.model().surface.triangles[static_cast<std::size_t>(t)])
           triangles.push_back(static_cast<std::uint32_t>(v));
-    session.set_pinned(0, true);
-    place();
   }
 
   /// The vertices' present places.
@@ -70,6 +81,7 @@ struct PagePose::Impl {
   }
 
   PosingSession session;
+  std::vector<std::pair<PosingSession, std::vector<PoseHandle>>> uncut;  // before each cut, and the handles then
   std::string name;
   std::vector<std::uint32_t> triangles;
   std::vector<PoseHandle> made;  // all that ever were
@@ -212,9 +224,31 @@ void PagePose::set_joint(Index joint, std::string_view told) {
   impl_->session.set_joint(joint, spec);
 }
 
+void PagePose::cut(Index part, const PoseStroke& stroke) {
+  Impl& m = *impl_;
+  PosingSession next = Impl::session_of(internal::cut_part(m.session.model(), part, stroke, m.posed));
+  const auto taken = static_cast<Index>(next.model().parts.size()) - 1;
+  for (Index p = 0; p <= taken; ++p) {
+    next.set_part(p, m.session.part_options(p == taken ? part : p));
+    next.set_pinned(p, p != taken && m.session.pinned(p));
+  }
+  next.forget_changes();
+  m.uncut.emplace_back(std::exchange(m.session, std::move(next)), std::exchange(m.made, {}));
+  m.held = {};
+  m.list_triangles();
+  m.place();
+}
+
 bool PagePose::undo() {
-  const bool done = impl_->session.undo();
-  impl_->place();
+  Impl& m = *impl_;
+  bool done = m.session.undo();
+  if (!done && !m.uncut.empty()) {
+    std::tie(m.session, m.made) = std::move(m.uncut.back());
+    m.uncut.pop_back();
+    m.list_triangles();
+    done = true;
+  }
+  m.place();
   return done;
 }
 

@@ -13,21 +13,14 @@ export class PoseApp {
     this.engine = engine;
     this.stage = stage;
     this.dragged = null;
+    this.cutting = false;  // the next stroke cuts
+    this.stroke = null;    // that cuts: events of its ends
     this.result = null;
-    this.geometry = new THREE.BufferGeometry();
-    this.geometry.setAttribute('position', new THREE.BufferAttribute(engine.positions(), 3));
-    this.geometry.setIndex(new THREE.BufferAttribute(engine.triangles, 1));
-    const materials = [];
-    let first = 0;
-    engine.scene.parts.forEach((part, i) => {
-      this.geometry.addGroup(3 * first, 3 * part.triangles, i);
-      first += part.triangles;
-      materials.push(new THREE.MeshStandardMaterial({ color: COLOURS[i % COLOURS.length], roughness: 0.6, side: THREE.DoubleSide, flatShading: true }));
-    });
-    const mesh = new THREE.Mesh(this.geometry, materials);
-    mesh.castShadow = mesh.receiveShadow = true;
-    mesh.frustumCulled = false;
-    stage.moving.add(mesh);
+    this.mesh = new THREE.Mesh();
+    this.mesh.castShadow = this.mesh.receiveShadow = true;
+    this.mesh.frustumCulled = false;
+    stage.moving.add(this.mesh);
+    this.makeParts();
     this.points = new THREE.Points(new THREE.BufferGeometry(),
       new THREE.PointsMaterial({ color: 0xc4302b, size: 9, sizeAttenuation: false, depthTest: false, transparent: true }));
     this.points.renderOrder = 2;
@@ -39,6 +32,24 @@ export class PoseApp {
     this.fit();
     stage.look(this.geometry.boundingBox);
     this.changed();
+  }
+
+  /** The drawn surface, part by part: a cut, or its undoing, makes others. */
+  makeParts() {
+    const { engine } = this, materials = [];
+    this.geometry?.dispose();
+    this.geometry = new THREE.BufferGeometry();
+    this.geometry.setAttribute('position', new THREE.BufferAttribute(engine.positions(), 3));
+    this.geometry.setIndex(new THREE.BufferAttribute(engine.triangles, 1));
+    let first = 0;
+    engine.scene.parts.forEach((part, i) => {
+      this.geometry.addGroup(3 * first, 3 * part.triangles, i);
+      first += part.triangles;
+      materials.push(new THREE.MeshStandardMaterial({ color: COLOURS[i % COLOURS.length], roughness: 0.6, side: THREE.DoubleSide, flatShading: true }));
+    });
+    if (Array.isArray(this.mesh.material)) for (const material of this.mesh.material) material.dispose();
+    Object.assign(this.mesh, { geometry: this.geometry, material: materials });
+    this.parts = materials.length;
   }
 
   listen() {
@@ -57,6 +68,12 @@ export class PoseApp {
   /** A handle near the pointer is taken again; else the surface under it gets a new one. */
   press(event) {
     if (event.button !== 0 || !event.isPrimary) return;
+    if (this.cutting) {
+      event.stopImmediatePropagation();
+      event.target.setPointerCapture(event.pointerId);
+      this.stroke = [event, event];
+      return;
+    }
     const near = this.engine.handles().map(({ point }, i) => ({ i, point, pixels: this.stage.pixelsFrom(event, point) }))
       .sort((a, b) => a.pixels - b.pixels)[0];
     const { from, along } = this.stage.ray(event);
@@ -75,6 +92,7 @@ export class PoseApp {
   }
 
   move(event) {
+    if (this.stroke) this.drawStroke([this.stroke[0], event]);
     if (!this.dragged) return;
     this.dragged = this.stage.across(event, this.dragged);
     this.engine.dragTo(this.dragged);
@@ -82,8 +100,35 @@ export class PoseApp {
   }
 
   release() {
+    if (this.stroke) this.cut();
     if (this.dragged) this.engine.letGo();
     this.dragged = null;
+  }
+
+  setCutting(cutting) {
+    this.cutting = cutting;
+    this.panel.build();
+  }
+
+  drawStroke(stroke) {
+    this.stroke = stroke;
+    const middle = this.stage.controls.target.toArray();
+    setLines(this.stage.rays, stroke.flatMap((event) => this.stage.across(event, middle)));
+    this.stage.draw();
+  }
+
+  /** Cuts the part that lies nearest the middle of the stroke. */
+  cut() {
+    const { stage, engine } = this, [from, to] = this.stroke;
+    this.stroke = null;
+    this.cutting = false;
+    setLines(stage.rays, []);
+    const at = (s) => stage.ray({ clientX: from.clientX + s * (to.clientX - from.clientX), clientY: from.clientY + s * (to.clientY - from.clientY) });
+    this.change(() => {
+      const hit = [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8].some((s) => engine.cast(at(s).from, at(s).along));
+      if (!hit) throw new Error('the line meets no part: draw it across one');
+      engine.cut(at(0).from, at(0).along, at(1).along);
+    });
   }
 
   /** What is asked of the engine, told where it cannot be; then the pose is looked for anew. */
@@ -94,6 +139,7 @@ export class PoseApp {
     } catch (error) {
       tell(error.message);
     }
+    if (this.parts !== this.engine.scene.parts.length) this.makeParts();
     this.panel.build();
     this.changed();
   }

@@ -4,8 +4,6 @@ export class PoseEngine {
     this.module = module;
     this.check(this.withTexts((a, b) => module._pose_open(a, b), model, joints));
     this.describe();
-    const at = module._pose_triangles() / 4, count = 3 * this.scene.parts.reduce((sum, part) => sum + part.triangles, 0);
-    this.triangles = module.HEAPU32.slice(at, at + count);
   }
 
   check(done) {
@@ -23,7 +21,11 @@ export class PoseEngine {
     return result;
   }
 
-  describe() { this.scene = JSON.parse(this.module.UTF8ToString(this.module._pose_description())); }
+  describe() {
+    this.scene = JSON.parse(this.module.UTF8ToString(this.module._pose_description()));
+    const at = this.module._pose_triangles() / 4, count = 3 * this.scene.parts.reduce((sum, part) => sum + part.triangles, 0);
+    this.triangles = this.module.HEAPU32.slice(at, at + count);
+  }
   doubles(at, count) { return this.module.HEAPF64.slice(at / 8, at / 8 + count); }
 
   positions() {
@@ -53,6 +55,8 @@ export class PoseEngine {
     this.check(this.withTexts((text) => this.module._pose_set_joint(joint, text), JSON.stringify(told)));
     this.describe();
   }
+  /** Cuts the part of the last cast. @param from, to directions from the eye to the ends of a stroke */
+  cut(eye, from, to) { this.check(this.module._pose_cut(...eye, ...from, ...to)); this.describe(); }
   undo() {
     const done = this.module._pose_undo() === 1;
     this.describe();

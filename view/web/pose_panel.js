@@ -25,7 +25,9 @@ export class PosePanel {
     this.sheets.fill([
       element('h1', { textContent: scene.name }),
       element('div', { className: 'row' }, button('Undo', () => app.undo()), button('Back to rest', () => app.reset()),
-        button('Let all go', () => app.change(() => app.engine.removeHandles())), button('Save', () => app.save())),
+        button('Let all go', () => app.change(() => app.engine.removeHandles())),
+        button('Cut', () => app.setCutting(!app.cutting), { 'aria-pressed': String(app.cutting), title: 'The next line that you draw across a part cuts it in two, with a joint between' }),
+        button('Save', () => app.save())),
       element('small', { textContent: 'Pull at any point: it stays where it is let go. Pull at a red point to move it again.' }),
       this.state], [
       section('Parts', true, ...scene.parts.map((part, i) => this.part(part, i))),

@@ -93,6 +93,8 @@ class PosingSession {
 
   /// Takes back the last change, pose included. @return false if there is none
   bool undo();
+  /// What was changed so far is not taken back any more.
+  void forget_changes();
 
   // Poses
 

@@ -23,6 +23,12 @@ struct PoseHit {
   double distance = 0.0;
 };
 
+/// A line drawn across the picture.
+struct PoseStroke {
+  Vec3 eye = Vec3::Zero();
+  Vec3 from = Vec3::UnitX(), to = Vec3::UnitY();  ///< directions from the eye to its ends
+};
+
 class PagePose {
  public:
   /// The first part is pinned, all are rigid.
@@ -57,6 +63,10 @@ class PagePose {
   /// @param told JSON, `type` and `limits` of the joints file. Another type keeps origin and axis
   /// @throws InputError naming the member
   void set_joint(Index joint, std::string_view told);
+  /// Cuts a part in two, right across: what is beyond the cut becomes the last part, on a ball (a virtual joint
+  /// [X09 4.4]). The pose goes back to rest, without handles.
+  /// @throws InvalidArgument where the stroke does not go right across the part
+  void cut(Index part, const PoseStroke& stroke);
   /// @return false where there is nothing to take back
   bool undo();
   void reset();
