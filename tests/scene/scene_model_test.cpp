@@ -78,6 +78,7 @@ TEST(SceneModel, AReducedModelKeepsTheRestBitForBit) {
       EXPECT_EQ(lean->render().basis.shape(v, i), model->render().basis.shape(v, of));
   }
   EXPECT_THROW(reduce_model(*model, std::vector<Index>{4, 1}), InvalidArgument);
+  EXPECT_THROW(reduce_model(*model, kept, 1.0, 0.0), InvalidArgument);
   EXPECT_THROW(reduce_model(*model, std::vector<Index>{5}), InvalidArgument);
 }
 
@@ -95,13 +96,14 @@ TEST(SceneModel, ARigidBodyOfAnAssetTellsOfNoFrequencies) {
   EXPECT_THROW(make_rigid(asset, 2), InvalidArgument);
 }
 
-TEST(SceneModel, WhatALeftOutModeAnsweredStaticallyGoesIntoTheResidual) {
+TEST(SceneModel, WhatALeftOutModeAnsweredStaticallyGoesIntoTheResidualAtAnyStiffness) {
   ModalModelData data = testing::block_data(5);
   ResidualCompliance residual(ResidualCompliance::Form::kFull, data.render.vertices());
   for (Index v = 0; v < residual.vertices(); ++v) residual.set(v, v, 1e-6 * Mat3::Identity());
   data.residual_compliance = residual;
   const ModalModel model(std::move(data));
   const auto lean = reduce_model(model, std::vector<Index>{0, 3});
+  const auto soft = reduce_model(model, std::vector<Index>{0, 3}, 1.0, 0.25);
   const auto statics = [](const ModalModel& m, Index a, Index b) {
     Mat3 sum = m.data().residual_compliance->block(a, b);
     for (Index i = 0; i < m.modes(); ++i)
@@ -114,8 +116,12 @@ TEST(SceneModel, WhatALeftOutModeAnsweredStaticallyGoesIntoTheResidual) {
     for (Index b = 0; b < model.render().vertices(); ++b) {
       constexpr double kFloat = 1e-6;  // single precision of both
       const Mat3 before = statics(model, a, b);
-      EXPECT_LE((statics(*lean, a, b) - before).norm(), kFloat * (statics(model, a, a).norm() + before.norm()));
+      const double least = kFloat * (statics(model, a, a).norm() + before.norm());
+      EXPECT_LE((statics(*lean, a, b) - before).norm(), least);
+      EXPECT_LE((0.25 * statics(*soft, a, b) - before).norm(), least) << "a quarter of the modulus gives way fourfold";
     }
+  for (std::size_t i = 0; i < 2; ++i)  // frequencies halve, damping ratios stay
+    EXPECT_DOUBLE_EQ(soft->data().decays[i], 0.5 * lean->data().decays[i]);
 }
 
 TEST(SceneModel, BodiesOfOneAssetShareOneModelAndPartsAreFoundByName) {

@@ -40,6 +40,25 @@ async function isLed(page) {
   check(Math.abs(await steps(page, 60) - stopped) < 2 * DEGREE, 'and it stays where it is stopped');
 }
 
+/** A part made softer rings lower, and goes on from where it is. */
+async function isMadeSoft(page) {
+  const look = () => page.evaluate(() => {
+    const { engine } = globalThis.limber, { models, bodies } = engine.scene, { model } = bodies.find(({ name }) => name.includes('arm'));
+    return { frequencies: models[model].frequencies, frame: [...engine.frame()], turn: engine.jointFrames()[6] };
+  });
+  const before = await look(), choice = page.locator('#panel details:has(> summary:text-is("Stiffness")) label:has-text("arm") select');
+  await choice.selectOption('0.01');
+  const soft = await look();
+  check(soft.frequencies.length > 0 && soft.frequencies.every((hz, i) => Math.abs(hz / before.frequencies[i] - 0.1) < 1e-9), `a hundredth of the modulus, a tenth of the frequencies: ${soft.frequencies}`);
+  check(soft.frame.every((x, i) => x === before.frame[i]), 'it goes on from where it is');
+  check(Math.abs(await steps(page, 30) - before.turn) < 10 * DEGREE, 'and stays on its hinge');
+  await choice.selectOption('null');
+  check((await look()).frequencies.length === 0, 'a rigid one has no modes');
+  await steps(page, 10);
+  await choice.selectOption('1');
+  check(JSON.stringify((await look()).frequencies) === JSON.stringify(before.frequencies), 'and gets them back');
+}
+
 /** Contacts, their forces, and the surfaces that touch are drawn when a person asks for them. */
 async function showsContacts(page) {
   await page.evaluate(() => {
@@ -72,6 +91,7 @@ await run('check_machine', file, async () => {
   if (wrong.length === 0) {
     await stays(page);
     await isLed(page);
+    await isMadeSoft(page);
     await showsContacts(page);
     check((await page.evaluate(() => document.querySelectorAll('#panel b').length)) === 0, 'no text has become markup');
   }

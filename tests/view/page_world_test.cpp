@@ -98,6 +98,39 @@ TEST_F(PageWorldTest, ASurfaceIsBentByNoMoreModesThanOneSees) {
   EXPECT_TRUE(fewer);
 }
 
+TEST_F(PageWorldTest, AModelMadeSoftGoesOnFromWhereItIs) {
+  PageWorld page(scene());
+  page.poke(page.cast_ray({-10, 0.1, 0.9}, {1, 0, 0}), {1, 0.3, 0.2});
+  step(page, 3);
+  const std::vector<double> baked = page.models()[0].frequencies;
+  const auto frame = [&] { return std::vector<float>(page.frame().begin(), page.frame().end()); };
+  const std::vector<float> before = frame();
+  page.set_stiffness(0, 0.25);
+  for (std::size_t i = 0; i < kModes; ++i)
+    EXPECT_NEAR(page.models()[0].frequencies[i], 0.5 * baked[i], 1e-12 * baked[i]);
+  EXPECT_EQ(frame(), before);
+  const std::vector<std::byte> soft = page.saved();
+  step(page, 5);
+  const std::uint64_t hash = page.state_hash();
+  page.restore(soft);
+  EXPECT_DOUBLE_EQ(page.settings().stiffness[0], 0.25);
+  step(page, 5);
+  EXPECT_EQ(page.state_hash(), hash) << "a page that is shared is as soft";
+
+  constexpr std::size_t kPose = 7;
+  const std::vector<float> moved = frame();
+  page.set_stiffness(0, kUnbounded);
+  EXPECT_TRUE(page.models()[0].frequencies.empty());
+  ASSERT_EQ(page.frame().size(), 2 * kPose);
+  EXPECT_TRUE(std::equal(moved.begin(), moved.begin() + kPose, page.frame().begin()));
+  step(page, 100);
+  page.set_stiffness(0, 1.0);
+  EXPECT_EQ(page.models()[0].frequencies, baked);
+  EXPECT_THROW(page.set_stiffness(0, 0.0), InvalidArgument);
+  EXPECT_THROW(page.set_stiffness(1, 1.0), InvalidArgument);
+  EXPECT_EQ(page.models()[0].frequencies, baked);
+}
+
 TEST_F(PageWorldTest, ARayMeetsTheNearestBody) {
   const PageWorld page(scene());
   const PageHit hit = page.cast_ray({-10, 0.1, 0.9}, {2, 0, 0});

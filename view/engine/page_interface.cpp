@@ -91,7 +91,8 @@ EMSCRIPTEN_KEEPALIVE const double* page_touching_size(int model) {
   return answer;
 }
 
-// The surface of a body as it is bent (PageWorld::bent()): by how many modes, and until the next 0 positions, 1 normals.
+// The surface of a body as it is bent (PageWorld::bent()): by how many modes, and until the next 0 positions, 1
+// normals.
 EMSCRIPTEN_KEEPALIVE int page_bend(int body, double tolerance, int touching) {
   bent = page->bent(body, tolerance, touching != 0);
   return static_cast<int>(bent.modes);
@@ -104,7 +105,14 @@ EMSCRIPTEN_KEEPALIVE int page_set_live(const double* settings) {
   return guarded([&] { page->set_live(settings_of(settings)); });
 }
 EMSCRIPTEN_KEEPALIVE int page_restart(const double* settings) {
-  return guarded([&] { page->restart(settings_of(settings)); });
+  return guarded([&] {
+    PageSettings next = settings_of(settings);
+    next.stiffness = page->settings().stiffness;
+    page->restart(next);
+  });
+}
+EMSCRIPTEN_KEEPALIVE int page_set_stiffness(int model, double factor) {
+  return guarded([&] { page->set_stiffness(model, factor); });
 }
 EMSCRIPTEN_KEEPALIVE int page_step() {
   return guarded([] { page->step(); });

@@ -37,6 +37,12 @@ Json limits(const JointSpec& spec) {
   return Json::array();
 }
 
+/// None: rigid.
+Json factor_json(const PageSettings& settings, std::size_t model) {
+  const double factor = model < settings.stiffness.size() ? settings.stiffness[model] : 1.0;
+  return std::isinf(factor) ? Json() : Json(factor);
+}
+
 constexpr double kHalfSide = 3.0;  // m, of what is shown of a half-space
 
 Json surface_json(const TriangleMesh& mesh, const RigidTransform& pose) {
@@ -70,6 +76,8 @@ std::string describe(const Scene& scene, const SceneModels& models, std::span<co
                      {"substeps", settings.substeps},        {"modes", settings.modes},
                      {"damping", settings.damping},          {"friction", settings.friction},
                      {"solver", to_string(settings.solver)}, {"joint_friction", settings.joint_friction}};
+  out["settings"]["stiffness"] = Json::array();
+  for (std::size_t i = 0; i < shown.size(); ++i) out["settings"]["stiffness"].push_back(factor_json(settings, i));
   out["contact"] = scene.contacts.options.has_value();
   out["models"] = Json::array();
   for (const PageModel& model : shown)

@@ -1,7 +1,9 @@
 #include "page_model.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "limber/dynamics/reconstruct.h"
 #include "limber/scene/scene_model.h"
@@ -25,11 +27,21 @@ PageModel page_model(const ModalModel& model, const ModalSurface& surface, const
 }
 
 std::shared_ptr<const ModalModel> with_settings(const std::shared_ptr<const ModalModel>& model,
-                                                const PageSettings& settings) {
-  if (settings.modes >= model->modes() && settings.damping == 1.0) return model;
+                                                const PageSettings& settings, double stiffness) {
+  if (settings.modes >= model->modes() && settings.damping == 1.0 && stiffness == 1.0) return model;
+  if (std::isinf(stiffness)) return reduce_model(*model, {});
   std::vector<Index> kept(static_cast<std::size_t>(std::min(settings.modes, model->modes())));
   std::iota(kept.begin(), kept.end(), Index{0});
-  return reduce_model(*model, kept, settings.damping);
+  return reduce_model(*model, kept, settings.damping, stiffness);
+}
+
+std::shared_ptr<const SoundModes> as_stiff(const std::shared_ptr<const SoundModes>& sound, double stiffness) {
+  if (stiffness == 1.0 || std::isinf(stiffness)) return sound;
+  SoundModes out = *sound;
+  for (double& eigenvalue : out.eigenvalues) eigenvalue *= stiffness;
+  for (double& decay : out.decays) decay *= std::sqrt(stiffness);
+  out.contact_modulus *= stiffness;
+  return std::make_shared<const SoundModes>(std::move(out));
 }
 
 }  // namespace limber::internal

@@ -19,6 +19,7 @@
 #include "page_history.h"
 #include "page_joints.h"
 #include "page_model.h"
+#include "page_motion.h"
 #include "page_sound.h"
 #include "page_tracks.h"
 
@@ -28,13 +29,13 @@ template <class Self>
 requires std::is_same_v<std::remove_const_t<Self>, PageSettings>
 auto state_fields(Self& s) {
   return std::tie(s.gravity, s.drag_frequency, s.poke_speed, s.step, s.substeps, s.modes, s.damping, s.friction,
-                  s.solver, s.joint_friction);
+                  s.solver, s.joint_friction, s.stiffness);
 }
 
 namespace {
 
 constexpr double kFar = 1e4;                              // m, how long rays are
-constexpr std::uint32_t kSaved = 0x4c505731;              // that bytes are a saved page, in this form
+constexpr std::uint32_t kSaved = 0x4c505732;              // that bytes are a saved page, in this form
 constexpr std::int64_t kForever = std::int64_t{1} << 40;  // steps: what the scene does ends by its own times
 
 void check(const PageSettings& s) {
@@ -50,6 +51,9 @@ void check(const PageSettings& s) {
   number(s.damping, false, "damping");
   number(s.friction, false, "friction");
   number(s.joint_friction, false, "joint_friction");
+  for (const double factor : s.stiffness)
+    if (!(factor > 0.0))
+      throw InvalidArgument("PageSettings: stiffness is " + std::to_string(factor) + ", expected a factor above 0");
   if (s.substeps < 1) throw InvalidArgument("PageSettings: substeps is " + std::to_string(s.substeps) + ", expected 1");
   if (s.modes < 0) throw InvalidArgument("PageSettings: modes is " + std::to_string(s.modes) + ", expected 0 or more");
 }
@@ -127,10 +131,11 @@ void PageWorld::Impl::start() {
   for (std::shared_ptr<const ModalModel>& model : models.of_body) {
     const auto [found, fresh] = kind_of.emplace(model.get(), static_cast<int>(kinds.size()));
     if (fresh) {
-      kinds.push_back(internal::with_settings(model, settings));
+      const double stiffness = kinds.size() < settings.stiffness.size() ? settings.stiffness[kinds.size()] : 1.0;
+      kinds.push_back(internal::with_settings(model, settings, stiffness));
       shown.push_back(internal::page_model(*kinds.back(), kinds.back()->render(), kinds.back()->render_extent()));
       const std::shared_ptr<const SoundModes>& heard = models.sound_of_body[kind_of_body.size()];
-      if (heard && heard->modes() > 0) shown.back().sound = heard;
+      if (heard && heard->modes() > 0) shown.back().sound = internal::as_stiff(heard, stiffness);
     }
     model = kinds[static_cast<std::size_t>(found->second)];
     kind_of_body.push_back(found->second);
@@ -165,8 +170,7 @@ const PageModel& PageWorld::touching(int model) {
   if (!kind.data().collision) return m.shown[static_cast<std::size_t>(model)];
   const auto found = m.told_to_page.touching.find(model);
   if (found != m.told_to_page.touching.end()) return found->second;
-  return m.told_to_page.touching
-      .emplace(model, internal::page_model(kind, kind.collision(), kind.collision_extent()))
+  return m.told_to_page.touching.emplace(model, internal::page_model(kind, kind.collision(), kind.collision_extent()))
       .first->second;
 }
 PageSurface PageWorld::bent(int body, double tolerance, bool touching) {
@@ -200,6 +204,30 @@ void PageWorld::restart(const PageSettings& settings) {
   check(settings);
   impl_->settings = settings;
   impl_->start();
+  keep();
+}
+
+void PageWorld::set_stiffness(int model, double factor) {
+  Impl& m = *impl_;
+  m.check_model(model, "set_stiffness");
+  PageSettings next = m.settings;
+  next.stiffness.resize(m.kinds.size(), 1.0);
+  next.stiffness[static_cast<std::size_t>(model)] = factor;
+  check(next);
+  const std::vector<internal::BodyMotion> before = internal::motions(m.world(), m.bodies);
+  const std::vector<int> drops(m.drops.begin(), m.drops.begin() + static_cast<std::ptrdiff_t>(m.dropped()));
+  const internal::JointWishes wishes = m.hands.joints;
+  m.settings = next;
+  m.start();
+  m.drops = drops;
+  m.add_dropped(drops.size());
+  internal::set_motions(before, m.bodies, m.world());
+  for (std::size_t joint = 0; joint < wishes.size(); ++joint)
+    for (int c = 0; c < 3; ++c) {
+      const internal::CoordinateWish& wish = wishes[joint][static_cast<std::size_t>(c)];
+      if (!std::isnan(wish.place) || !std::isnan(wish.speed))
+        m.joints->wish(m.world(), m.hands.joints, static_cast<int>(joint), c, wish);
+    }
   keep();
 }
 

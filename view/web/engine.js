@@ -73,6 +73,9 @@ export class Engine {
   setLive(s) { this.writeSettings(s); this.check(this.module._page_set_live(this.settingsAt)); }
   restart(s) { this.writeSettings(s); this.check(this.module._page_restart(this.settingsAt)); this.describe(); }
 
+  /** @param factor on Young's modulus; Infinity: rigid */
+  setStiffness(model, factor) { this.check(this.module._page_set_stiffness(model, factor)); this.describe(); }
+
   step() { this.check(this.module._page_step()); this.check(this.module._page_keep()); }
   steps() { return this.module._page_steps_taken(); }
   hash() { return this.module.UTF8ToString(this.module._page_hash()); }

@@ -134,15 +134,22 @@ class App {
     this.show();
   }
 
-  restart() {
+  restart() { this.begin(() => this.engine.restart(this.settings)); }
+
+  /** @param factor on Young's modulus; Infinity: rigid */
+  setStiffness(model, factor) { this.begin(() => this.engine.setStiffness(model, factor)); }
+
+  /** The clock begins anew, with other models. */
+  begin(act) {
     this.dragged = null;
     this.key = this.mode = null;
     try {
-      this.engine.restart(this.settings);
+      act();
     } catch (error) {
       return tell(error.message);
     }
     this.stage.load(this.engine);
+    this.sound.begin();
     for (const chart of [this.panel.energy, this.panel.time, this.panel.contacts]) chart.clear();
     this.panel.build();
     this.show();

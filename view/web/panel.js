@@ -9,6 +9,8 @@ const KEYS = [['Space', 'pause, play'], ['.', 'one step'], ['Home', 'see all'], 
 const MANY = 6;  // models: more fill the panel
 const SOLVERS = [['game', 'game'], ['exact', 'exact']];
 
+const STIFFNESS = [['null', 'rigid'], ['10', '× 10'], ['1', 'as baked'], ['0.1', '÷ 10'], ['0.01', '÷ 100'], ['0.001', '÷ 1,000']];  // of Young's modulus
+
 const count = (number, one, many) => `${number} ${number === 1 ? one : many}`;
 
 export class Panel {
@@ -40,6 +42,7 @@ export class Panel {
       ...(app.sound.possible ? [section('Sound', true, ...app.sound.controls())] : [])], [
       section('World', true, ...this.world()),
       section('Modes', scene.joints.length === 0 && !scene.contact, ...this.modes()),
+      section('Stiffness', scene.joints.length > 0 && scene.models.length <= MANY, ...this.stiffness()),
       section('Joints', scene.joints.length > 0, ...this.joints.build()),
       section('Show', true, this.marks.build()),
       section('Charts', true, this.energy.element, this.time.element, this.contacts.element, this.state),
@@ -97,6 +100,16 @@ export class Panel {
     const { app } = this;
     return section('Drop', app.engine.scene.models.length <= MANY, element('div', { className: 'row' }, ...app.engine.scene.models.map((model, i) =>
       button(model.name, () => app.drop(i)))));
+  }
+
+  /** By model: at once, from where bodies stand. */
+  stiffness() {
+    const { app } = this, { models, settings } = app.engine.scene;
+    return models.flatMap(({ name, frequencies }, i) => {
+      const now = settings.stiffness[i];
+      return frequencies.length === 0 && now !== null ? [] : [choice(name, STIFFNESS, String(now), (factor) =>
+        app.setStiffness(i, factor === 'null' ? Infinity : Number(factor)))];
+    });
   }
 
   modes() {

@@ -24,7 +24,7 @@ export class Sound {
     this.contactTime = 5e-4;
     this.waiting = [];    // numbers of blows of this frame
     this.numbers = [];    // per body of the scene {model, number}, as the synthesizer has it
-    this.count = 0;       // of the synthesizer's bodies
+    this.count = this.kindCount = 0;  // of the synthesizer's bodies, and of its models
   }
 
   /** Whether there is something to hear. */
@@ -88,15 +88,21 @@ export class Sound {
   sendKinds() {
     const { engine } = this.app;
     this.kinds = engine.scene.models.map((_, i) => engine.sound(i));
-    let number = 0;
     for (const kind of this.kinds) {
       if (kind === null) continue;
       const { modes, vertices, eigenvalues, decays, gains, shapes } = kind, numbers = new Float64Array(3 * modes);
       [eigenvalues, decays, gains].forEach((part, i) => numbers.set(part, i * modes));
       this.node.port.postMessage({ kind: { modes, vertices, numbers, shapes } }, [numbers.buffer, shapes.buffer]);
-      kind.number = number++;
+      kind.number = this.kindCount++;
       kind.shapes = null;
     }
+  }
+
+  /** Models are others. */
+  begin() {
+    if (!this.node) return;
+    this.numbers = [];
+    this.sendKinds();
   }
 
   /** The number of a body in the synthesizer, which gets it where it has none. */

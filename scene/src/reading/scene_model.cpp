@@ -167,8 +167,7 @@ ResidualCompliance with_statics_of_dropped(const ModalModel& model, std::span<co
 }
 
 /// @param parts that stay
-std::shared_ptr<const ModalModel> lean_model(const ModalModel& model, std::span<const Index> kept, double damping,
-                                             const Parts& parts) {
+ModalModelData lean_data(const ModalModel& model, std::span<const Index> kept, const Parts& parts) {
   const ModalModelData& all = model.data();
   ModalModelData lean;
   lean.name = all.name;
@@ -181,7 +180,6 @@ std::shared_ptr<const ModalModel> lean_model(const ModalModel& model, std::span<
   lean.inertia = all.inertia;
   lean.eigenvalues = pick(all.eigenvalues, kept);
   lean.decays = pick(all.decays, kept);
-  for (double& decay : lean.decays) decay *= damping;
   lean.participation = pick(all.participation, kept);
   lean.mode_scales = pick(all.mode_scales, kept);
   lean.moments = pick(all.moments, kept);
@@ -197,7 +195,7 @@ std::shared_ptr<const ModalModel> lean_model(const ModalModel& model, std::span<
   }
   if (all.volume_block && parts.volume) lean.volume_block = pick(*all.volume_block, kept);
   if (all.residual_compliance && parts.residual) lean.residual_compliance = with_statics_of_dropped(model, kept);
-  return std::make_shared<const ModalModel>(std::move(lean));
+  return lean;
 }
 
 /// A scene's use of the bodies of one model.
@@ -330,7 +328,8 @@ std::shared_ptr<const ModalModel> leave_out(const std::shared_ptr<const ModalMod
   if (!manifest.dropped.empty()) leaving.note_modes("the scene's limits say that nobody can see them");
   leave_out_parts(leaving, data, needs, use);
   leaving.count(model->modes());
-  auto lean = manifest.left_out.empty() ? model : lean_model(*model, kept, 1.0, leaving.parts());
+  auto lean =
+      manifest.left_out.empty() ? model : std::make_shared<const ModalModel>(lean_data(*model, kept, leaving.parts()));
   manifest.modes = lean->modes();
   manifest.bytes = shape_bytes(lean->data());
   manifest.multiply_adds = multiply_adds(*lean);
@@ -353,7 +352,8 @@ std::size_t shape_bytes(const ModalModelData& data) {
   return bytes_of(data, static_cast<Index>(data.eigenvalues.size()), {});
 }
 
-std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::span<const Index> kept, double damping) {
+std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::span<const Index> kept, double damping,
+                                               double stiffness) {
   for (std::size_t i = 0; i < kept.size(); ++i)
     if (kept[i] < 0 || kept[i] >= model.modes() || (i > 0 && kept[i] <= kept[i - 1]))
       throw InvalidArgument("reduce_model: kept[" + std::to_string(i) + "] is " + std::to_string(kept[i]) +
@@ -361,7 +361,15 @@ std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::spa
   if (!(damping >= 0.0 && std::isfinite(damping)))
     throw InvalidArgument("reduce_model: damping is " + std::to_string(damping) +
                           ", expected a finite factor of at least 0");
-  return lean_model(model, kept, damping, {.volume = false});
+  if (!(stiffness > 0.0 && std::isfinite(stiffness)))
+    throw InvalidArgument("reduce_model: stiffness is " + std::to_string(stiffness) +
+                          ", expected a finite factor above 0");
+  ModalModelData lean = lean_data(model, kept, {.volume = false});
+  for (double& decay : lean.decays) decay *= damping * std::sqrt(stiffness);
+  for (double& eigenvalue : lean.eigenvalues) eigenvalue *= stiffness;
+  if (lean.residual_compliance)
+    for (float& value : lean.residual_compliance->values()) value /= static_cast<float>(stiffness);
+  return std::make_shared<const ModalModel>(std::move(lean));
 }
 
 void make_rigid(Asset& asset, std::size_t body) {

@@ -83,9 +83,10 @@ SceneModels load_models(const Scene& scene, const SceneUse& use = {});
 SceneModels make_models(const Scene& scene, const std::map<std::string, Asset>& assets, const SceneUse& use = {});
 
 /// A model with some of the modes and without its volume block. @param kept ascending, in range
-/// @param damping factor on the decays of all modes, ≥ 0 @throws InvalidArgument
+/// @param damping factor on the decays of all modes, ≥ 0. @param stiffness factor on Young's modulus, > 0: damping
+/// ratios stay @throws InvalidArgument
 std::shared_ptr<const ModalModel> reduce_model(const ModalModel& model, std::span<const Index> kept,
-                                               double damping = 1.0);
+                                               double damping = 1.0, double stiffness = 1.0);
 
 /// Makes a body of an asset rigid: leaves out all its modes, as reduce_model() does, and their frequencies' errors.
 /// @throws InvalidArgument if the asset has no such body

@@ -31,6 +31,8 @@ struct PageSettings {
   double friction = 0.5;                         ///< ≥ 0, where the scene has contact
   ContactSolver solver = kDefaultContactSolver;  ///< not where the scene has one of [H03]'s rules
   double joint_friction = 1.0;                   ///< factor on the friction in joints; ≥ 0
+  /// By model a factor on Young's modulus; > 0, infinite: rigid. Damping ratios stay. Models beyond the end: 1.
+  std::vector<double> stiffness{};
 };
 
 /// A model once for all its bodies.
@@ -39,7 +41,7 @@ struct PageModel {
   double mass = 0.0;                       ///< kg
   std::vector<float> rest{}, normals{};    ///< 3 V each: of the rest shape, m; unit
   std::vector<std::uint32_t> triangles{};  ///< 3 T
-  std::vector<double> frequencies{};  ///< Hz, k
+  std::vector<double> frequencies{};       ///< Hz, k
   /// The amplitude at which a mode moves some vertex by a tenth of the model's size, k.
   std::vector<double> visible_amplitudes{};
   std::shared_ptr<const SoundModes> sound{};  ///< null: one does not hear it
@@ -81,6 +83,10 @@ class PageWorld {
   void set_live(const PageSettings& settings);
   /// Starts the scene anew. @throws InvalidArgument for numbers out of range, and then changes nothing
   void restart(const PageSettings& settings);
+  /// PageSettings::stiffness of a model. The clock begins anew, from where bodies stand, as fast as they are; a model
+  /// that is rigid now, or no longer, is straight. Nothing is held any more, but joints are led on.
+  /// @throws InvalidArgument for a model that there is not, or a number out of range, and then changes nothing
+  void set_stiffness(int model, double factor);
 
   void step();
   std::int64_t steps_taken() const;
