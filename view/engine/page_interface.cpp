@@ -64,7 +64,10 @@ extern "C" {
 
 EMSCRIPTEN_KEEPALIVE const char* page_error() { return error.c_str(); }
 EMSCRIPTEN_KEEPALIVE int page_open(const char* scene) {
-  return guarded([&] { page = std::make_unique<PageWorld>(scene); });
+  return guarded([&] { page = std::make_unique<PageWorld>(scene, false); });
+}
+EMSCRIPTEN_KEEPALIVE int page_begin() {
+  return guarded([] { page->begin(); });
 }
 EMSCRIPTEN_KEEPALIVE const char* page_description() {
   return guarded([] { text = page->description(); }) != 0 ? text.c_str() : "";

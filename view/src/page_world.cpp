@@ -71,6 +71,7 @@ struct PageWorld::Impl {
   }
 
   void start();
+  void list_kinds();
   World& world() { return player->world(); }
   const World& world() const { return player->world(); }
   BodyId id(int body) const { return bodies[static_cast<std::size_t>(body)].id; }
@@ -115,8 +116,7 @@ struct PageWorld::Impl {
   } told_to_page;  // what spans of the page point into
 };
 
-void PageWorld::Impl::start() {
-  player.reset();  // it refers to what follows
+void PageWorld::Impl::list_kinds() {
   scene = told;
   scene.step = settings.step;
   scene.substeps = settings.substeps;
@@ -127,32 +127,41 @@ void PageWorld::Impl::start() {
   std::map<const ModalModel*, int> kind_of;
   told_to_page.touching.clear();
   kinds.clear(), shown.clear(), bodies.clear(), drops.clear(), history.clear();
-  std::vector<int> kind_of_body;
   for (std::shared_ptr<const ModalModel>& model : models.of_body) {
     const auto [found, fresh] = kind_of.emplace(model.get(), static_cast<int>(kinds.size()));
     if (fresh) {
       const double stiffness = kinds.size() < settings.stiffness.size() ? settings.stiffness[kinds.size()] : 1.0;
       kinds.push_back(internal::with_settings(model, settings, stiffness));
       shown.push_back(internal::page_model(*kinds.back(), kinds.back()->render(), kinds.back()->render_extent()));
-      const std::shared_ptr<const SoundModes>& heard = models.sound_of_body[kind_of_body.size()];
+      const std::shared_ptr<const SoundModes>& heard = models.sound_of_body[bodies.size()];
       if (heard && heard->modes() > 0) shown.back().sound = internal::as_stiff(heard, stiffness);
     }
     model = kinds[static_cast<std::size_t>(found->second)];
-    kind_of_body.push_back(found->second);
+    bodies.push_back({{}, found->second, scene.bodies[bodies.size()].name});
   }
+}
+
+void PageWorld::Impl::start() {
+  player.reset();  // it refers to what follows
+  list_kinds();
   for (SceneJoint& joint : scene.joints)
     for (JointActuation& acts : joint.coordinates) acts.friction *= settings.joint_friction;
   for (SceneBody& body : scene.bodies) body.placement.modal_skin = false;  // as the page draws them
   player.emplace(scene, models, kForever);
   world().set_stage_times(&times);
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
-    bodies.push_back({player->bodies()[i], kind_of_body[i], scene.bodies[i].name});
+  for (std::size_t i = 0; i < bodies.size(); ++i) bodies[i].id = player->bodies()[i];
   hands = {};
   sound.begin(shown, kinds);
   joints.emplace(scene, world(), bodies, player->joints());
 }
 
-PageWorld::PageWorld(const std::filesystem::path& scene) : impl_(std::make_unique<Impl>(scene)) {
+PageWorld::PageWorld(const std::filesystem::path& scene, bool begins) : impl_(std::make_unique<Impl>(scene)) {
+  if (begins)
+    begin();
+  else
+    impl_->list_kinds();
+}
+void PageWorld::begin() {
   impl_->start();
   keep();
 }
@@ -175,6 +184,7 @@ const PageModel& PageWorld::touching(int model) {
 }
 PageSurface PageWorld::bent(int body, double tolerance, bool touching) {
   Impl& m = *impl_;
+  if (!m.player) return {};
   const ModalModel& model = m.world().model(m.id(body));
   const std::span<const double> z = m.world().body(m.id(body)).amplitudes;
   const Index modes = drawn_modes(touching ? model.collision_extent() : model.render_extent(), z, tolerance);
@@ -245,12 +255,18 @@ std::uint64_t PageWorld::state_hash() const { return impl_->world().state_hash()
 std::span<const float> PageWorld::frame() {
   Impl& m = *impl_;
   m.told_to_page.frame.clear();
-  for (const internal::PageBody& body : m.bodies) {
-    const BodyView view = m.world().body(body.id);
-    const auto& [q, p] = view.pose;
+  for (std::size_t i = 0; i < m.bodies.size(); ++i) {
+    const RigidTransform pose = m.player ? m.world().body(m.bodies[i].id).pose : m.scene.bodies[i].placement.pose;
+    const auto& [q, p] = pose;
     for (const double x : {p.x(), p.y(), p.z(), q.w, q.x, q.y, q.z})
       m.told_to_page.frame.push_back(static_cast<float>(x));
-    for (const double z : view.amplitudes) m.told_to_page.frame.push_back(static_cast<float>(z));
+    if (m.player)
+      for (const double z : m.world().body(m.bodies[i].id).amplitudes)
+        m.told_to_page.frame.push_back(static_cast<float>(z));
+    else
+      m.told_to_page.frame.resize(
+          m.told_to_page.frame.size() +
+          static_cast<std::size_t>(m.kinds[static_cast<std::size_t>(m.bodies[i].model)]->modes()));
   }
   return m.told_to_page.frame;
 }

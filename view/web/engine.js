@@ -25,6 +25,9 @@ export class Engine {
     this.describe();
   }
 
+  /** Makes the world: until then bodies may be looked at as they are placed. */
+  begin() { this.check(this.module._page_begin()); }
+
   check(done) {
     if (!done) throw new Error(this.module.UTF8ToString(this.module._page_error()));
   }

@@ -28,10 +28,18 @@ class App {
     this.pointer = null;  // a pointer's last place over the picture, until it was looked at
     stage.load(engine);
     this.sound = new Sound(this);
+    stage.placeBodies(engine);
     stage.frameAll(engine);
     this.panel = new Panel(document.getElementById('panel'), this);
-    this.listen();
     this.fit();
+    stage.frameAll(engine);
+    stage.draw();
+  }
+
+  /** What was seen at rest comes to life. */
+  start() {
+    this.engine.begin();
+    this.listen();
     this.seeAll();
   }
 
@@ -253,12 +261,17 @@ class App {
 
 async function main() {
   const original = new Original();
+  const stage = new Stage(document.getElementById('view'));
+  stage.prepare();
   const { scene, joints, files, stands } = JSON.parse(document.getElementById('files').textContent);
   const module = await openModule(bytesOf(document.getElementById('engine').textContent), files);
   const engine = joints ? new PoseEngine(module, scene, joints) : new Engine(module, scene);
   document.title = `${engine.scene.name} – limber`;
-  const stage = new Stage(document.getElementById('view'));
   const app = joints ? new PoseApp(engine, stage) : new App(engine, stage);
+  if (!joints) {
+    await new Promise((seen) => requestAnimationFrame(() => setTimeout(seen)));
+    app.start();
+  }
   app.original = original;
   if (stands) app.goOn(stands);
   globalThis.limber = app;

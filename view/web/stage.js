@@ -47,6 +47,16 @@ export class Stage {
     return made;
   }
 
+  /** Has the GPU make its programs ready while the engine is unpacked: what is drawn is smaller than a pixel. */
+  prepare() {
+    const speck = { points: [0, 0, 0, 0, 0, 0, 0, 0, 0], triangles: [0, 1, 2] }, geometry = surface(speck);
+    geometry.computeVertexNormals();
+    const specks = [new SurfaceBody({ geometry }, 0).mesh, standing({ ...speck, ground: true })];
+    for (const mesh of specks) mesh.frustumCulled = false, this.scene.add(mesh);
+    this.draw();
+    for (const mesh of specks) this.scene.remove(mesh);
+  }
+
   /** Models and shapes anew; bodies by syncBodies(). */
   load(engine) {
     for (const body of this.bodies) this.moving.remove(body.mesh), body.dispose();
@@ -78,6 +88,15 @@ export class Stage {
   }
 
   place(engine) {
+    this.placeBodies(engine);
+    this.drawJoints(engine);
+    engine.sensorCounts().forEach((count, i) => this.sensors.children[i].material.color.set(count > 0 ? 0xd9822b : 0x2f7d5b));
+    const hand = engine.hand();
+    setLines(this.hand, hand.holds ? [...hand.point, ...hand.target] : []);
+    return hand;
+  }
+
+  placeBodies(engine) {
     const frame = engine.frame();
     let at = 0;
     this.bodies.forEach((body, i) => {
@@ -86,11 +105,6 @@ export class Stage {
     });
     this.goAlong();
     this.bend(engine, frame);
-    this.drawJoints(engine);
-    engine.sensorCounts().forEach((count, i) => this.sensors.children[i].material.color.set(count > 0 ? 0xd9822b : 0x2f7d5b));
-    const hand = engine.hand();
-    setLines(this.hand, hand.holds ? [...hand.point, ...hand.target] : []);
-    return hand;
   }
 
   /** Bodies by so few modes that no vertex is seen to be off. */
@@ -147,10 +161,7 @@ export class Stage {
   /** Looks at all bodies as they are. */
   frameAll(engine) {
     const box = new THREE.Box3(), point = new THREE.Vector3();
-    engine.scene.bodies.forEach((_, i) => {
-      const positions = engine.reconstruct(i);
-      for (let k = 0; k < positions.length; k += 3) box.expandByPoint(point.fromArray(positions, k));
-    });
+    for (const { mesh } of this.bodies) box.expandByObject(mesh, true);
     for (const shape of engine.scene.statics)
       if (!shape.ground) for (let k = 0; k < shape.points.length; k += 3) box.expandByPoint(point.fromArray(shape.points, k));
     this.look(box, engine.scene.statics.some((shape) => shape.ground));

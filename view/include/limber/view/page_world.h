@@ -63,8 +63,10 @@ struct PageHit {
 
 class PageWorld {
  public:
-  /// @throws InputError as read_scene() and load_models()
-  explicit PageWorld(const std::filesystem::path& scene);
+  /// @param begins false: bodies may be looked at as they are placed, by description(), models(), frame() and bent(),
+  /// until begin() makes the world, which takes longer @throws InputError as read_scene() and load_models()
+  explicit PageWorld(const std::filesystem::path& scene, bool begins = true);
+  void begin();
   ~PageWorld();
 
   /// Contents of the scene as JSON: settings, models, bodies (model, name), statics and sensors with their triangles,
