@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -240,6 +241,41 @@ TEST_F(AssemblyProgram, TheFirstCommandTakesTheFilesGroupsAndMeshesNoRigidPart) 
       volume += enclosed_volume({drawn.surface.vertices, {first, first + group.count}});
     }
   EXPECT_NEAR(mass("base"), 1140.0 * volume, 1e-9 * mass("base")) << "kg, of nylon";
+}
+
+// Two blocks that share an edge enclose what they do; a box without a lid is wrapped, and tells no frequencies.
+TEST_F(AssemblyProgram, RigidPartsOfShellsThatTouchAreNotMeshedAndOpenOnesTellNoFrequencies) {
+  using Face = std::array<int, 4>;
+  const auto vertices = [](double x, double z) {
+    std::string text;
+    for (int i = 0; i < 8; ++i)
+      text += "v " + std::to_string(x + (i & 1)) + " " + std::to_string((i >> 1) & 1) + " " +
+              std::to_string(z + ((i >> 2) & 1)) + "\n";
+    return text;
+  };
+  const auto faces = [](const std::array<int, 8>& number, bool lid) {
+    std::vector<Face> all{{0, 2, 3, 1}, {0, 1, 5, 4}, {1, 3, 7, 5}, {3, 2, 6, 7}, {2, 0, 4, 6}};
+    if (lid) all.push_back({4, 5, 7, 6});
+    std::string text;
+    for (const Face& face : all) {
+      text += "f";
+      for (const int corner : face) text += " " + std::to_string(number[static_cast<std::size_t>(corner)]);
+      text += "\n";
+    }
+    return text;
+  };
+  write_file(folder_ / "m.obj", vertices(0, 0) + vertices(1, 1) + vertices(5, 0) + "g pair\n" +
+                                    faces({1, 2, 3, 4, 5, 6, 7, 8}, true) +
+                                    faces({6, 10, 8, 12, 13, 14, 15, 16}, true) + "g pot\n" +
+                                    faces({17, 18, 19, 20, 21, 22, 23, 24}, false));
+  const ProgramResult r = testing::run_program(
+      "limber-precompute", {"m.obj", "--auto-joints", "--material", "nylon", "--rigid", "*", "-o", "lamp.glb"},
+      folder_);
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.err, HasSubstr("wrapped, since it has 4 boundary edges"));
+  EXPECT_EQ(r.err.find("wrapped"), r.err.rfind("has been wrapped") + 9) << "once: " << r.err;
+  EXPECT_THAT(r.err, ::testing::Not(HasSubstr("frequencies are too high")));
+  EXPECT_NEAR(mass("pair"), 2.0 * 1140.0, 1e-9 * 1140.0) << "kg, of nylon";
 }
 
 TEST_F(AssemblyProgram, TrianglesWithTwoCornersAtOnePlaceAreDroppedWithAWarning) {
