@@ -36,13 +36,12 @@ struct LivePair {
   RigidTransform X_LS{};             ///< then: the smaller body in the frame of the larger one
   double reach = 0.0;                ///< gaps up to here were asked for, m
   Vec3 parting = Vec3::Zero();       ///< of pairs by fields, see FieldMotion; zero: not looked for yet
-  double comes = 0.0;                ///< of pairs by fields: how far they were expected to, m
   std::vector<double> amplitudes{};  ///< of a, then of b
   std::vector<KeptPoint> points{};   ///< ascending in id
 
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.known, s.X_LS, s.reach, s.parting, s.comes, s.amplitudes, s.points);
+    return std::tie(s.known, s.X_LS, s.reach, s.parting, s.amplitudes, s.points);
   }
 };
 

@@ -93,6 +93,7 @@ struct ManifoldFinder::Impl {
   static double expected_bends(const internal::ManifoldBody& body, const BodyState& state);
   void find_manifolds(Jobs& jobs);
   bool keeps(const internal::LivePair& pair, const internal::PairQuery& query) const;
+  static double way(const internal::PairQuery& query, const RigidTransform& from, const RigidTransform& to);
   double comes(const internal::PairQuery& query) const;
   bool hardly_moved(const internal::PairQuery& query, const RigidTransform& from, const RigidTransform& to) const;
   bool lasts(const internal::PairQuery& query) const;

@@ -55,7 +55,7 @@ double ManifoldFinder::Impl::farthest(const PairQuery& q) const {
 }
 
 /// How far points of one body may come against the other while a manifold is kept: by what it moves, turns and bends;
-/// by fields also what more their motion closes.
+/// by fields all of it together, and what the expected motion closes from there.
 double ManifoldFinder::Impl::slack(const PairQuery& q) const {
   const double parts = q.by_fields ? 3.0 : q.a.modal || q.b.modal ? 2.0 : 1.0;
   return parts * farthest(q) + options.recycle_turn * std::min(q.a.radius, q.b.radius);
@@ -64,7 +64,7 @@ double ManifoldFinder::Impl::slack(const PairQuery& q) const {
 bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const {
   const double farthest = this->farthest(q);
   if (!pair.known || (q.by_fields ? q.expected.near > pair.reach : q.reach > pair.reach + farthest)) return false;
-  if (!hardly_moved(q, pair.X_LS, q.X_LS)) return false;
+  if (!q.by_fields && !hardly_moved(q, pair.X_LS, q.X_LS)) return false;
   double bent = 0.0;
   const double* z = pair.amplitudes.data();
   for (const auto& [body, amplitudes] : {std::pair(&q.a, q.state_a.amplitudes), std::pair(&q.b, q.state_b.amplitudes)})
@@ -73,7 +73,7 @@ bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const
       if (body->modal->surface->skin() != nullptr && change > 0.0) return false;
       bent += change * body->modal->surface->largest_shape(static_cast<Index>(i));
     }
-  return bent <= farthest && (!q.by_fields || pair.comes + comes(q) <= farthest);
+  return q.by_fields ? way(q, pair.X_LS, q.X_LS) + bent + comes(q) <= slack(q) : bent <= farthest;
 }
 
 bool ManifoldFinder::Impl::hardly_moved(const PairQuery& q, const RigidTransform& from,
@@ -84,7 +84,7 @@ bool ManifoldFinder::Impl::hardly_moved(const PairQuery& q, const RigidTransform
 
 /// Whether a manifold that is made now can be kept in the next query, as far as the expected motion tells.
 bool ManifoldFinder::Impl::lasts(const PairQuery& q) const {
-  return !q.by_fields || (q.a.bends + q.b.bends <= farthest(q) && hardly_moved(q, q.X_LS, q.expected.X_LS_end));
+  return !q.by_fields || 2.0 * comes(q) <= slack(q);  // as it comes and, made then, as it comes further
 }
 
 double ManifoldFinder::Impl::expected_bends(const ManifoldBody& body, const BodyState& state) {
@@ -95,11 +95,14 @@ double ManifoldFinder::Impl::expected_bends(const ManifoldBody& body, const Body
   return bends;
 }
 
-/// How far points of one body are expected to come against the other.
+/// How far points of one body come against the other as the smaller one moves in the frame of the larger.
+double ManifoldFinder::Impl::way(const PairQuery& q, const RigidTransform& from, const RigidTransform& to) {
+  return (to.p - from.p).norm() + 2.0 * (to.q * from.q.conjugate()).vector().norm() * std::min(q.a.radius, q.b.radius);
+}
+
+/// How far they are expected to, modes included.
 double ManifoldFinder::Impl::comes(const PairQuery& q) const {
-  const Quaternion turn = q.expected.X_LS_end.q * q.X_LS.q.conjugate();
-  return (q.expected.X_LS_end.p - q.X_LS.p).norm() + 2.0 * turn.vector().norm() * std::min(q.a.radius, q.b.radius) +
-         q.a.bends + q.b.bends;
+  return way(q, q.X_LS, q.expected.X_LS_end) + q.a.bends + q.b.bends;
 }
 
 namespace {
@@ -133,7 +136,7 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   pair.points.assign(worker.made.begin(), worker.made.end());
   std::sort(pair.points.begin(), pair.points.end(), [](const KeptPoint& p, const KeptPoint& r) { return p.id < r.id; });
   pair.known = kept;
-  pair.X_LS = q.X_LS, pair.comes = q.by_fields ? comes(q) : 0.0;
+  pair.X_LS = q.X_LS;
   pair.reach = q.by_fields ? q.expected.near : q.reach;
   pair.amplitudes.clear();
   if (!kept) return;  // nothing asks for them
