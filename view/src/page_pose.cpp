@@ -245,6 +245,7 @@ bool PagePose::undo() {
   if (!done && !m.uncut.empty()) {
     std::tie(m.session, m.made) = std::move(m.uncut.back());
     m.uncut.pop_back();
+    m.held = {};
     m.list_triangles();
     done = true;
   }

@@ -56,7 +56,11 @@ export class PoseApp {
     const canvas = this.stage.renderer.domElement;
     canvas.addEventListener('pointerdown', (event) => this.press(event), { capture: true });
     canvas.addEventListener('pointermove', (event) => this.move(event));
-    for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => this.release());
+    canvas.addEventListener('pointerup', () => this.release());
+    canvas.addEventListener('pointercancel', () => {
+      this.endStroke();
+      this.release();
+    });
     addEventListener('resize', () => this.fit());
     addEventListener('keydown', (event) => {
       if (event.key === 'z' && (event.ctrlKey || event.metaKey) && !(event.target instanceof HTMLInputElement)) this.undo();
@@ -117,12 +121,16 @@ export class PoseApp {
     this.stage.draw();
   }
 
+  endStroke() {
+    this.stroke = null;
+    setLines(this.stage.rays, []);
+  }
+
   /** Cuts the part that lies nearest the middle of the stroke. */
   cut() {
     const { stage, engine } = this, [from, to] = this.stroke;
-    this.stroke = null;
+    this.endStroke();
     this.cutting = false;
-    setLines(stage.rays, []);
     const at = (s) => stage.ray({ clientX: from.clientX + s * (to.clientX - from.clientX), clientY: from.clientY + s * (to.clientY - from.clientY) });
     this.change(() => {
       const hit = [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8].some((s) => engine.cast(at(s).from, at(s).along));
