@@ -57,14 +57,12 @@ void look_for_line(const Assembly& assembly, const std::vector<std::vector<Bend>
   if (point) internal::add_hypothesis_of_line(*point, pair.slippage);
 }
 
-bool is_flat(const PairOfParts& pair) { return pair.slippage.hypotheses.front().joint.type == JointType::kPlanar; }
-
 /// Bends of the components that a flat contact asks for; of the others none.
 std::vector<std::vector<Bend>> bends_at_flat_contacts(const Assembly& assembly, const std::vector<PairOfParts>& pairs,
                                                       double crease_angle, Jobs& jobs) {
   std::vector<bool> asked(assembly.components.size(), false);
   for (const PairOfParts& pair : pairs)
-    if (is_flat(pair)) asked[static_cast<std::size_t>(pair.a())] = asked[static_cast<std::size_t>(pair.b())] = true;
+    if (pair.is_flat()) asked[static_cast<std::size_t>(pair.a())] = asked[static_cast<std::size_t>(pair.b())] = true;
   std::vector<std::vector<Bend>> out(asked.size());
   jobs.parallel_for(out.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t c = begin; c < end; ++c)
@@ -82,7 +80,7 @@ void analyse(const Assembly& assembly, const DetectionOptions& options, Jobs& jo
   const auto bends = bends_at_flat_contacts(assembly, pairs, options.contact.crease_angle, jobs);
   jobs.parallel_for(pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      if (is_flat(pairs[i])) look_for_line(assembly, bends, pairs[i]);
+      if (pairs[i].is_flat()) look_for_line(assembly, bends, pairs[i]);
   });
   internal::explain_flanges(assembly, pairs);
 }

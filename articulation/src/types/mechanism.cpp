@@ -10,8 +10,6 @@
 namespace limber::internal {
 namespace {
 
-JointHypothesis& first(PairOfParts& pair) { return pair.slippage.hypotheses.front(); }
-
 /// Whether nothing but this pair's contact leads from one of its parts to the other.
 bool is_bridge(const Assembly& assembly, const std::vector<PairOfParts>& pairs, const PairOfParts& bridge) {
   DisjointSets groups(assembly.components.size());
@@ -20,16 +18,16 @@ bool is_bridge(const Assembly& assembly, const std::vector<PairOfParts>& pairs, 
   return groups.root(bridge.a()) != groups.root(bridge.b());
 }
 
-Vec3 normal_of(const JointHypothesis& planar) { return planar.joint.frame.axes.col(2); }
+Vec3 normal_of(const PairOfParts& flat) { return flat.slippage.hypotheses.front().joint.frame.axes.col(2); }
 
 }  // namespace
 
 void explain_flanges(const Assembly& assembly, std::vector<PairOfParts>& pairs) {
   std::vector<PairOfParts*> flat;
   for (PairOfParts& pair : pairs)
-    if (first(pair).joint.type == JointType::kPlanar && is_bridge(assembly, pairs, pair)) flat.push_back(&pair);
-  const auto looks_another_way = [&](PairOfParts* pair) {
-    return std::abs(normal_of(first(*pair)).dot(normal_of(first(*flat.front())))) < tuning().types.line.one_way;
+    if (pair.is_flat() && is_bridge(assembly, pairs, pair)) flat.push_back(&pair);
+  const auto looks_another_way = [&](const PairOfParts* pair) {
+    return std::abs(normal_of(*pair).dot(normal_of(*flat.front()))) < tuning().types.line.one_way;
   };
   if (std::none_of(flat.begin(), flat.end(), looks_another_way)) return;
   for (PairOfParts* pair : flat) prefer_turn(pair->slippage);

@@ -16,6 +16,7 @@ struct PairOfParts {
 
   Index a() const { return regions.front().a; }
   Index b() const { return regions.front().b; }
+  bool is_flat() const { return slippage.hypotheses.front().joint.type == JointType::kPlanar; }
 };
 
 /// Where flat contacts alone hold parts together, they rest on each other, and weight presses all of them one way.
