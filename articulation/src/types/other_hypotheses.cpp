@@ -45,19 +45,20 @@ std::optional<Vec3> middle_of_round_face(const std::vector<ContactRegion>& regio
   return plane.origin + plane.axes.leftCols<2>() * middle;
 }
 
-/// A turn about a flat contact's normal, with a share of the confidence in both.
+bool is_turn(const JointHypothesis& hypothesis) { return hypothesis.joint.type == JointType::kRevolute; }
+
+/// A turn about a flat contact's normal in place of any other turn, with a share of the confidence in all.
 void add_turn(const Vec3& through, std::string reason, Slippage& out) {
   JointHypothesis& first = out.hypotheses.front();
   for (const JointHypothesis& other : out.hypotheses)
-    if (other.joint.type == JointType::kRevolute) first.confidence += other.confidence;
+    if (is_turn(other)) first.confidence += other.confidence;
+  std::erase_if(out.hypotheses, is_turn);
   JointHypothesis turns = first;
   turns.joint.type = JointType::kRevolute;
   const Mat3& plane = first.joint.frame.axes;
   turns.joint.frame.origin = through;
   turns.joint.frame.axes << plane.col(2), plane.col(0), plane.col(1);
   turns.reason = std::move(reason);
-  turns.confidence = 0.0;
-  replace_hypothesis(turns, out);
   turns.confidence = share_of_first(tuning().types.others.round_share, out);
   replace_hypothesis(std::move(turns), out);
 }
@@ -99,7 +100,6 @@ void add_hypothesis_of_line(const Vec3& point, Slippage& out) {
 }
 
 void prefer_turn(Slippage& out) {
-  const auto is_turn = [](const JointHypothesis& h) { return h.joint.type == JointType::kRevolute; };
   const double worth = tuning().types.others.worth_telling;
   auto turn = std::find_if(out.hypotheses.begin(), out.hypotheses.end(), is_turn);
   if (turn == out.hypotheses.end() || turn->confidence < worth) {
