@@ -115,7 +115,7 @@ std::optional<Vec3> common_line(const std::vector<Bend>& a, const std::vector<Be
   const std::array lines{lines_near(a, plane, middle, radius), lines_near(b, plane, middle, radius)};
   const double off = t.off * radius;
   double most = 0.0;
-  std::optional<Flat> found;
+  std::optional<Flat> found;  // the point from which the squares of distances to these lines are least
   for (const auto& some : lines)
     for (std::size_t i = 0; i < std::min(some.size(), t.paired); ++i)
       for (std::size_t j = 0; j < i; ++j) {
@@ -125,12 +125,11 @@ std::optional<Vec3> common_line(const std::vector<Bend>& a, const std::vector<Be
         if (on_a.weight <= most || !on_a.tells()) continue;
         const Passing on_b = passing(lines[1], *c, off);
         if (on_b.weight <= most || !on_b.tells()) continue;
-        most = std::min(on_a.weight, on_b.weight), found = c;
+        most = std::min(on_a.weight, on_b.weight);
+        found = (on_a.across + on_b.across).ldlt().solve(on_a.along + on_b.along);
       }
   if (!found) return std::nullopt;
-  const Passing on_a = passing(lines[0], *found, off), on_b = passing(lines[1], *found, off);
-  const Flat c = (on_a.across + on_b.across).ldlt().solve(on_a.along + on_b.along);
-  return Vec3(middle + plane * c);
+  return Vec3(middle + plane * *found);
 }
 
 }  // namespace limber::internal
