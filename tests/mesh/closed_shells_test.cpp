@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <vector>
 
 #include "limber/core/error.h"
 #include "sample_meshes.h"
@@ -50,6 +52,17 @@ TEST(ClosedShells, AreSplitByTheirLabels) {
   EXPECT_THROW(split_into_shells(s, std::vector<Index>(23, 0)), InvalidArgument);
   label[3] = -1;
   EXPECT_THROW(split_into_shells(s, label), InvalidArgument);
+}
+
+TEST(ClosedShells, HaveNoBoundaryEvenWhereTwoShareAnEdge) {
+  SurfaceMesh s;
+  s.vertices = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}};
+  s.triangles = {{0, 3, 2}, {0, 1, 3}, {0, 2, 1}, {1, 2, 3}, {0, 5, 4}, {0, 1, 5}, {0, 4, 1}, {1, 4, 5}};
+  EXPECT_FALSE(surface_quality(s).closed_manifold());
+  EXPECT_TRUE(boundary_of(s).empty());
+  EXPECT_NEAR(enclosed_volume(s), 1.0 / 3.0, 1e-15);
+  s.triangles.pop_back();  // it ran 1, 4, 5: the others run these edges the other way
+  EXPECT_EQ(boundary_of(s), (std::vector<std::array<Index, 2>>{{4, 1}, {1, 5}, {5, 4}}));
 }
 
 TEST(ClosedShells, OneInsideOutIsTurned) {

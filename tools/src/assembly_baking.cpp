@@ -3,12 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
-#include <utility>
 
 #include "limber/articulation/contact_region.h"
 #include "limber/articulation/detect_joints.h"
@@ -97,23 +95,12 @@ bool is_rigid(const AssemblyOptions& options, const std::string& name) {
   return std::ranges::any_of(options.rigid, [&](const std::string& r) { return r == "*" || r == name; });
 }
 
-/// Whether a surface, of shells that may touch along edges, runs every edge as often one way as the other.
-bool encloses_volume(const SurfaceMesh& surface) {
-  std::map<std::pair<Index, Index>, int> runs;
-  for (const Triangle& t : surface.triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index from = t[k], to = t[(k + 1) % 3];
-      runs[{std::min(from, to), std::max(from, to)}] += from < to ? 1 : -1;
-    }
-  return std::ranges::all_of(runs, [](const auto& run) { return run.second == 0; }) && enclosed_volume(surface) > 0.0;
-}
-
 /// A part that does not bend, from its surface alone; nothing where that, mended, bounds no solid.
 std::optional<BakeResult> rigid_part(const std::string& name, SurfaceMesh surface, double density) {
   if (!surface_quality(surface).closed_manifold()) mend_surface(surface, weld_tolerance(surface));
   if (surface_quality(surface).closed_manifold())
     turn_shells_outward(surface);
-  else if (!encloses_volume(surface))
+  else if (!boundary_of(surface).empty() || !(enclosed_volume(surface) > 0.0))
     return std::nullopt;
   const MassProperties mass = mass_properties(TriangleMesh{surface.vertices, surface.triangles}, density);
   ModalModelData data;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "limber/mesh/closed_shells.h"
 #include "tuning.h"
 
 namespace limber::internal {
@@ -18,19 +19,11 @@ double area_of(const SurfaceMesh& surface, const Triangle& t) {
   return 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
 }
 
-/// Per vertex, where edges lead that are run through more often this way than the other: the surface's boundary. As
-/// many lead to each vertex as away from it, since triangles are loops.
+/// Per vertex, where the edges of the boundary lead. As many lead to each vertex as away from it, since triangles are
+/// loops.
 std::map<Index, std::vector<Index>> boundary(const SurfaceMesh& surface) {
-  std::map<std::pair<Index, Index>, int> surplus;  // by (low, high): upward less downward
-  for (const Triangle& t : surface.triangles)
-    for (int k = 0; k < 3; ++k) {
-      const Index a = t[k], b = t[(k + 1) % 3];
-      surplus[{std::min(a, b), std::max(a, b)}] += a < b ? 1 : -1;
-    }
   std::map<Index, std::vector<Index>> out;
-  for (const auto& [edge, count] : surplus)
-    for (int i = 0; i < std::abs(count); ++i)
-      out[count > 0 ? edge.first : edge.second].push_back(count > 0 ? edge.second : edge.first);
+  for (const auto& [from, to] : boundary_of(surface)) out[from].push_back(to);
   return out;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <string>
 #include <utility>
@@ -77,6 +78,20 @@ std::vector<SurfaceShell> split_into_shells(const SurfaceMesh& surface, std::spa
 
 bool holds(const SurfaceShell& outer, const SurfaceShell& inner) {
   return outer.box.contains(inner.box) && std::abs(winding_number(outer.surface, inner.surface.vertices.front())) > 0.5;
+}
+
+std::vector<std::array<Index, 2>> boundary_of(const SurfaceMesh& surface) {
+  std::map<std::pair<Index, Index>, int> surplus;  // by (low, high): upward less downward
+  for (const Triangle& t : surface.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3];
+      surplus[{std::min(a, b), std::max(a, b)}] += a < b ? 1 : -1;
+    }
+  std::vector<std::array<Index, 2>> out;
+  for (const auto& [edge, count] : surplus)
+    for (int i = 0; i < std::abs(count); ++i)
+      out.push_back(count > 0 ? std::array{edge.first, edge.second} : std::array{edge.second, edge.first});
+  return out;
 }
 
 Index turn_shells_outward(SurfaceMesh& surface) {

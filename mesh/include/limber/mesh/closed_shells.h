@@ -2,6 +2,7 @@
 /// The shells of a surface, which holds which, and which way the triangles of closed ones run.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,11 @@ std::vector<SurfaceShell> split_into_shells(const SurfaceMesh& surface, std::spa
 /// Whether a closed shell holds another that it does not cross, whichever way its triangles run.
 /// @pre the inner one has a vertex
 bool holds(const SurfaceShell& outer, const SurfaceShell& inner);
+
+/// The surface's boundary: edges that triangles run more often one way than the other, from and to a vertex that way,
+/// each as many times as more often. None: every ray that enters the surface leaves it, shells may touch along edges.
+/// @pre the surface is valid (see validate())
+std::vector<std::array<Index, 2>> boundary_of(const SurfaceMesh& surface);
 
 /// Turns the closed shells whose triangles run the wrong way round. A shell is what hangs together by edges; vertices
 /// at equal coordinates count as one. Shells bound solids by the even-odd rule: one that lies in no other runs
