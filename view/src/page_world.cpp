@@ -84,6 +84,9 @@ struct PageWorld::Impl {
     return static_cast<std::size_t>(
         std::count_if(bodies.begin(), bodies.end(), [](const internal::PageBody& b) { return b.dropped; }));
   }
+  std::vector<int> dropped_models() const {
+    return {drops.begin(), drops.begin() + static_cast<std::ptrdiff_t>(dropped())};
+  }
   void check_model(int model, const char* function) const {
     if (model < 0 || static_cast<std::size_t>(model) >= kinds.size())
       throw InvalidArgument(std::string("PageWorld::") + function + ": model " + std::to_string(model) +
@@ -225,7 +228,7 @@ void PageWorld::set_stiffness(int model, double factor) {
   next.stiffness[static_cast<std::size_t>(model)] = factor;
   check(next);
   const std::vector<internal::BodyMotion> before = internal::motions(m.world(), m.bodies);
-  const std::vector<int> drops(m.drops.begin(), m.drops.begin() + static_cast<std::ptrdiff_t>(m.dropped()));
+  const std::vector<int> drops = m.dropped_models();
   const internal::JointWishes wishes = m.hands.joints;
   m.settings = next;
   m.start();
@@ -506,8 +509,7 @@ std::vector<std::byte> PageWorld::saved() const {
   std::vector<std::byte> bytes, state;
   m.player->save_state(state);
   StateWriter write(bytes);
-  write(kSaved, m.settings,
-        std::vector<int>(m.drops.begin(), m.drops.begin() + static_cast<std::ptrdiff_t>(m.dropped())));
+  write(kSaved, m.settings, m.dropped_models());
   internal::write_hands(m.hands, write);
   write(state);
   return bytes;

@@ -85,8 +85,8 @@ class PageWorld {
   void set_live(const PageSettings& settings);
   /// Starts the scene anew. @throws InvalidArgument for numbers out of range, and then changes nothing
   void restart(const PageSettings& settings);
-  /// PageSettings::stiffness of a model. The clock begins anew, from where bodies stand, as fast as they are; a model
-  /// that is rigid now, or no longer, is straight. Nothing is held any more, but joints are led on.
+  /// PageSettings::stiffness of a model. The clock begins at 0; bodies keep their places and speeds, and their bending
+  /// unless the model becomes rigid or was. Hands and pins let go; joints are led on.
   /// @throws InvalidArgument for a model that there is not, or a number out of range, and then changes nothing
   void set_stiffness(int model, double factor);
 
