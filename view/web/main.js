@@ -29,7 +29,6 @@ class App {
     stage.load(engine);
     this.sound = new Sound(this);
     stage.placeBodies(engine);
-    stage.frameAll(engine);
     this.panel = new Panel(document.getElementById('panel'), this);
     this.fit();
     stage.frameAll(engine);
