@@ -1,4 +1,4 @@
-// Gears, and a rack with its pinion: each keeps its freedom, as the other goes along.
+// Gears, a rack with its pinion, a cam with its follower: each keeps its freedom, as the other goes along.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -151,6 +151,43 @@ TEST(CoupledMotion, APinionGoesAsFarAsItsRackDoes) {
   EXPECT_FALSE(couplings[0].first.turns);
   EXPECT_TRUE(couplings[0].second.turns);
   EXPECT_NEAR(couplings[0].ratio, -1.0 / kRadius, 0.05 / kRadius);
+  EXPECT_EQ(overall_kinematics(assembly, joints, couplings).mobility, 1);
+}
+
+/// An eccentric in a yoke, which goes up and down while the eccentric goes round.
+TEST(CoupledMotion, ACamTurnsFullyAndItsFollowerGoesAlong) {
+  constexpr double kRadius = 3.0, kThrow = 1.0, kInner = kRadius + 0.05;
+  constexpr int kSegments = 24;
+  SurfaceMesh yoke;
+  for (const double low : {-kInner - 1, kInner}) shapes::append(shapes::box({-5, low, -1}, {5, low + 1, 1}), yoke);
+  for (const double low : {-6.0, 5.0})
+    shapes::append(shapes::box({low, -kInner - 1, -1}, {low + 1, kInner + 1, 1}), yoke);
+  Assembly assembly;
+  assembly.components = {component_of("plate", shapes::box({-9, -9, -9}, {9, 9, -5})),
+                         component_of("cam", parts::cylinder({kThrow, 0, 0}, Vec3::UnitZ(), kRadius, 2, kSegments)),
+                         component_of("yoke", yoke)};
+  const std::vector<DetectedJoint> joints{joint_of(0, 1, JointType::kRevolute, Vec3::UnitZ(), {0, 0, 0}),
+                                          joint_of(0, 2, JointType::kPrismatic, Vec3::UnitY(), {0, 0, 0})};
+  const std::vector<RangeOfMotion> ranges = ranges_of_motion(assembly, joints);
+  ASSERT_EQ(ranges[0].joint.type, JointType::kRevolute);
+  EXPECT_TRUE(ranges[0].joint.limits.rotation.open());
+  ASSERT_EQ(ranges[1].joint.type, JointType::kPrismatic);
+  // Half a facet before the dead centre, where the follower's way parts in two, and at most with a facet level.
+  const Interval way = ranges[1].joint.limits.translation[0];
+  const double least = kInner - kRadius + kThrow, most = kInner - (kRadius - kThrow) * std::cos(kPi / kSegments) + 2e-3;
+  for (const double end : {way.high, -way.low}) {
+    EXPECT_GE(end, least);
+    EXPECT_LE(end, most);
+  }
+  for (std::size_t j = 0; j < 2; ++j) {
+    ASSERT_EQ(ranges[j].freedoms[0].coupled.size(), 1u);
+    EXPECT_EQ(ranges[j].freedoms[0].coupled[0].joint, 1 - j);
+    EXPECT_NEAR(ranges[j].freedoms[0].coupled[0].as_read, kThrow, 0.3);  // within the play corners of facets lead
+    EXPECT_THAT(ranges[j].reasons, Contains(HasSubstr("whose speed changes on the way")));
+  }
+  const std::vector<JointCoupling> couplings = joint_couplings(ranges);
+  ASSERT_EQ(couplings.size(), 1u);
+  EXPECT_FALSE(couplings[0].even);
   EXPECT_EQ(overall_kinematics(assembly, joints, couplings).mobility, 1);
 }
 

@@ -44,6 +44,7 @@ class Engagement {
     const FreeMotion own = free_motion(first_.bodies, Posed(second_, middle(*play)).bodies, first_.path, options_, 0.0);
     if (own.overlapping || !own.reachable.bounded()) return {};
     out_.engaged = true;
+    options_.largest_overlap = own.tolerance;  // on the way parts overlap by no more than as drawn
     start_ = middle(*play);
     out_.as_read = slope_within(0.5 * std::min(own.reachable.high, -own.reachable.low));
     out_.reachable.high = march(1.0, own.reachable.high, first_.limits.high);
