@@ -101,22 +101,21 @@ struct RangeTotals {
   double degrees = 0.0, thousandths = 0.0;  ///< worst of those whose ends match
 };
 
-/// Per class of variants and type of joint: how many ranges are right within 1 degree or a thousandth of the diagonal.
+/// Per class of variants: how many ranges are right within 1 degree or a thousandth of the diagonal.
 int run_limits(const DetectionOptions& options, const RangeOptions& ranges, bool verbose, const std::string& only,
                const std::string& group_text) {
   TbbJobs jobs;
   for (const auto* names : {&tuning_names(), &held_out_names()}) {
-    std::printf("%s\n%-34s %-12s %5s %7s %9s %12s\n", names == &tuning_names() ? "tuning" : "held out", "variants",
-                "joint", "n", "right%", "worst deg", "worst 1e-3 d");
+    std::printf("%s\n%-34s %5s %6s %9s %12s\n", names == &tuning_names() ? "tuning" : "held out", "variants", "n",
+                "right", "worst deg", "worst 1e-3 d");
     for (const VariantClass& group : range_variant_classes()) {
       if (group.name.find(group_text) == std::string::npos) continue;
-      std::map<int, RangeTotals> by_type;
+      RangeTotals totals;
       for (const std::string& name : *names) {
         if (!only.empty() && only != name) continue;
         for (const Variant& variant : group.variants)
           for (const RangeScore& r : scored_ranges(make(name, variant), options, jobs, ranges)) {
             if (!group.with_balls && r.type == static_cast<int>(JointType::kBall)) continue;
-            RangeTotals& totals = by_type[r.type];
             ++totals.all;
             totals.right += r.right() ? 1 : 0;
             double& worst = r.angle ? totals.degrees : totals.thousandths;
@@ -126,9 +125,8 @@ int run_limits(const DetectionOptions& options, const RangeOptions& ranges, bool
                           variant.clearance, variant.phase, r.joint.c_str(), r.freedom.c_str(), r.found.c_str());
           }
       }
-      for (const auto& [type, t] : by_type)
-        std::printf("%-34s %-12s %5d %7.2f %9.4f %12.4f\n", group.name.c_str(), kColumns[type], t.all,
-                    100.0 * t.right / t.all, t.degrees, t.thousandths);
+      std::printf("%-34s %5d %6d %9.4f %12.4f\n", group.name.c_str(), totals.all, totals.right, totals.degrees,
+                  totals.thousandths);
       std::fflush(stdout);
     }
   }

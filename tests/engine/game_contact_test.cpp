@@ -104,6 +104,23 @@ TEST(GameContact, AStackOfTenStandsAndComesToRest) {
   EXPECT_TRUE(scene.world.constraint_report().solved);
 }
 
+/// Corners are met one after the other: whichever comes first must not tilt a body.
+TEST(GameContact, CubesSetDownInLineStayInLine) {
+  for (const double size : {0.05, 1.0}) {
+    ManifoldFinder finder;
+    World world({.step = 1.0 / 60.0});
+    world.set_contact_source(&finder);
+    world.add_static(std::make_shared<const Shape>(HalfSpace{}));
+    const auto cube = std::make_shared<const Shape>(Box{Vec3::Constant(0.5 * size)});
+    BodyId top;
+    for (int i = 0; i < 10; ++i) top = world.add_rigid(cube, 700.0, {.pose = {.p = {0.0, 0.0, (0.5 + i) * size}}});
+    for (int i = 0; i < 300; ++i) world.step();
+    const BodyView view = world.body(top);
+    EXPECT_LT(view.pose.p.head<2>().norm(), 3e-4) << size;
+    EXPECT_LT(view.velocity.norm(), 2e-3) << size;
+  }
+}
+
 TEST(GameContact, LightBricksCarryOneAHundredTimesAsHeavy) {
   for (const auto& [light, substeps] : {std::pair{1, 16}, std::pair{2, 24}}) {
     Bricks scene(game(substeps));

@@ -179,7 +179,7 @@ TEST(GameMachines, BricardsLoopMovesWithOneFreedom) {
 TEST(GameMachines, ADoorInItsFrameIsThrownOpenByABall) {
   Watched scene;
   const auto leaf = sample_model({.modes = 0, .half_extent = {0.4, 0.02, 1.0}});
-  const BodyId door = scene.world.add_body(leaf, {.pose = {{}, {0.41, 0.0, 1.05}}});
+  const BodyId door = scene.world.add_body(leaf, {.pose = {{}, {0.41, 0.0, depth_below_origin(*leaf) + 0.05}}});
   JointSpec hinge = about(Vec3::UnitZ(), {0.0, 0.0, 0.0});
   hinge.limits.rotation = {0.0, 1.5};
   std::vector<JointId> hinges;

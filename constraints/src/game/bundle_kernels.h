@@ -100,9 +100,9 @@ void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes);
 /// block of zeros at their end. @param share of an overlap beyond the slop that is undone in the substep. @param most m
 void measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
                      float most);
-/// One sweep of Gauss–Seidel: each contact's normal, then both tangents by one step. A forward one tells bundles what
-/// their forces do, a backward one adds them up. @param motion coordinates at the substep's end, as found so far, with
-/// a block of zeros at their end
+/// One sweep of Gauss–Seidel: each contact's normal, then both tangents by one step. A forward one takes the normals of
+/// a pair backward first, and tells bundles what their forces do; a backward one adds them up. @param motion
+/// coordinates at the substep's end, as found so far, with a block of zeros at their end
 void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion);
 /// One sweep over displacements of the frames alone that part what overlaps. @param pushes by frame, with a block of
 /// zeros at their end

@@ -200,21 +200,21 @@ HWY_INLINE HWY_ATTR Block8* RowsOf(const BundleArrays& all, const PairBundle& bu
   return all.rows + bundle.rows + 3 * k * (bundle.modes[0] + bundle.modes[1]);
 }
 
-/// Adds what the modes give to the three rows' numbers.
-HWY_INLINE HWY_ATTR void AddModes(const PairBundle& bundle, const Block8* rows, const Modes& modes, std::size_t lane,
-                                  Vector* u) {
+/// Adds what the modes give to the rows' numbers of the first axes.
+HWY_INLINE HWY_ATTR void AddModes(const PairBundle& bundle, const Block8* rows, std::size_t axes, const Modes& modes,
+                                  std::size_t lane, Vector* u) {
   for (std::size_t s = 0; s < 2; ++s)
     for (std::int32_t i = 0; i < bundle.modes[s]; ++i, rows += 3)
-      for (std::size_t axis = 0; axis < 3; ++axis)
+      for (std::size_t axis = 0; axis < axes; ++axis)
         u[axis] = hn::MulAdd(Get(rows[axis], lane), hn::Load(Lanes(), modes.of(s, i)), u[axis]);
 }
 
-HWY_INLINE HWY_ATTR void MoveModes(const PairBundle& bundle, const Block8* rows, const Vector* by, std::size_t lane,
-                                   const Modes& modes) {
+HWY_INLINE HWY_ATTR void MoveModes(const PairBundle& bundle, const Block8* rows, std::size_t axes, const Vector* by,
+                                   std::size_t lane, const Modes& modes) {
   for (std::size_t s = 0; s < 2; ++s)
     for (std::int32_t i = 0; i < bundle.modes[s]; ++i, rows += 3) {
       Vector y = hn::Load(Lanes(), modes.of(s, i));
-      for (std::size_t axis = 0; axis < 3; ++axis) y = hn::MulAdd(by[axis], Get(rows[axis], lane), y);
+      for (std::size_t axis = 0; axis < axes; ++axis) y = hn::MulAdd(by[axis], Get(rows[axis], lane), y);
       hn::Store(y, Lanes(), modes.of(s, i));
     }
 }
@@ -239,18 +239,18 @@ HWY_INLINE HWY_ATTR void MoveSides(const BundleContact& c, std::size_t axes, con
   }
 }
 
-/// The three rows' numbers for the coordinates as they are.
+/// The numbers of a contact's first rows for the coordinates as they are: of the normal's, or of all three.
 HWY_INLINE HWY_ATTR void ReadRows(const PairBundle& bundle, const BundleContact& c, const Block8* rows,
-                                  const Coordinates& y, std::size_t lane, Vector* u) {
-  for (std::size_t axis = 0; axis < 3; ++axis) u[axis] = ReadAxis(c, axis, y.sides, lane);
-  AddModes(bundle, rows, y.modes, lane, u);
+                                  std::size_t axes, const Coordinates& y, std::size_t lane, Vector* u) {
+  for (std::size_t axis = 0; axis < axes; ++axis) u[axis] = ReadAxis(c, axis, y.sides, lane);
+  AddModes(bundle, rows, axes, y.modes, lane, u);
 }
 
-/// What changes of the three forces move.
+/// What changes of these rows' forces move.
 HWY_INLINE HWY_ATTR void MoveCoordinates(const PairBundle& bundle, const BundleContact& c, const Block8* rows,
-                                         const Vector* by, std::size_t lane, Coordinates& y) {
-  MoveSides(c, 3, by, y.sides, lane);
-  MoveModes(bundle, rows, by, lane, y.modes);
+                                         std::size_t axes, const Vector* by, std::size_t lane, Coordinates& y) {
+  MoveSides(c, axes, by, y.sides, lane);
+  MoveModes(bundle, rows, axes, by, lane, y.modes);
 }
 
 }  // namespace limber::internal::HWY_NAMESPACE

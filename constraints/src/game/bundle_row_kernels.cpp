@@ -65,7 +65,7 @@ HWY_INLINE HWY_ATTR void MakeMasses(const PairBundle& bundle, BundleContact& c, 
   // One step for both tangents: what slides is braked against its slip.
   Put(Inverse(LargestOf(of[3], of[5], of[4])), c.inverse_tangent, lane);
   Vector bent[3] = {hn::Zero(Lanes()), hn::Zero(Lanes()), hn::Zero(Lanes())};
-  AddModes(bundle, rows, shapes, lane, bent);
+  AddModes(bundle, rows, 3, shapes, lane, bent);
   Put(hn::Sub(Get(c.rest, lane), bent[0]), c.rest, lane);
 }
 
@@ -203,7 +203,7 @@ HWY_ATTR void MeasureBundles(const BundleArrays& all, const FrameShift* frames, 
       ReadModes(all, bundle, shapes, lane, modes);
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         Vector bent[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-        AddModes(bundle, RowsOf(all, bundle, k), modes, lane, bent);
+        AddModes(bundle, RowsOf(all, bundle, k), 3, modes, lane, bent);
         if (MeasureOne(all.contacts[bundle.first + k], come, bent, share, most, lane)) bundle.overlaps = true;
       }
       if (bundle.carried) AddCarried(all, bundle, frames, lane);

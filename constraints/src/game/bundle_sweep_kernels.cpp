@@ -41,15 +41,21 @@ HWY_INLINE HWY_ATTR Vector NormalForce(const BundleContact& c, Vector plain, std
   return hn::Max(plain, hn::IfThenElse(hn::Gt(energy, zero), root, zero));
 }
 
+/// @param u the normal's number. @return the change of its force
+HWY_INLINE HWY_ATTR Vector SolveNormal(const PairBundle& bundle, BundleContact& c, Vector u, std::size_t lane) {
+  const Vector before = Get(c.force[0], lane);
+  const Vector plain = hn::MulAdd(Approach(c, u, lane), Get(c.inverse_normal, lane), before);
+  const Vector normal = bundle.rebounds ? NormalForce(c, plain, lane) : hn::Max(hn::Zero(Lanes()), plain);
+  Put(normal, c.force[0], lane);
+  return hn::Sub(normal, before);
+}
+
 /// @param u the rows' numbers. @param change out: of the forces
 HWY_INLINE HWY_ATTR void SolveOne(const PairBundle& bundle, BundleContact& c, const Vector* u, std::size_t lane,
                                   Vector* change) {
-  const Lanes d;
-  const Vector zero = hn::Zero(d), before = Get(c.force[0], lane);
+  change[0] = SolveNormal(bundle, c, u[0], lane);
+  const Vector zero = hn::Zero(Lanes()), normal = Get(c.force[0], lane);
   Vector wanted[2];
-  const Vector plain = hn::MulAdd(Approach(c, u[0], lane), Get(c.inverse_normal, lane), before);
-  const Vector normal = bundle.rebounds ? NormalForce(c, plain, lane) : hn::Max(zero, plain);
-  change[0] = hn::Sub(normal, before);
   for (std::size_t t = 0; t < 2; ++t) {
     const Vector slip = hn::Add(u[1 + t], Get(c.slip[t], lane));
     wanted[t] = hn::NegMulAdd(Get(c.inverse_tangent, lane), hn::MulAdd(Get(c.coupling[t], lane), change[0], slip),
@@ -58,7 +64,6 @@ HWY_INLINE HWY_ATTR void SolveOne(const PairBundle& bundle, BundleContact& c, co
   const Vector square = hn::MulAdd(wanted[0], wanted[0], hn::Mul(wanted[1], wanted[1]));
   const Vector most = hn::IfThenElseZero(hn::Gt(normal, zero), hn::Mul(Get(c.friction, lane), normal));
   const Vector share = ShareWithin(square, most);
-  Put(normal, c.force[0], lane);
   for (std::size_t t = 0; t < 2; ++t) {
     const Vector tangent = hn::Mul(share, wanted[t]);
     change[1 + t] = hn::Sub(tangent, Get(c.force[1 + t], lane));
@@ -118,6 +123,20 @@ HWY_INLINE HWY_ATTR void AddUp(BundleContact& c, std::size_t lane) {
     Put(hn::Add(Get(c.sum[axis], lane), Get(c.force[axis], lane)), c.sum[axis], lane);
 }
 
+/// The normals of pairs, against the order in which a forward sweep solves their contacts next, so that no body tilts
+/// by the corner that comes first. The last is solved next anyway.
+HWY_INLINE HWY_ATTR void SweepNormals(const BundleArrays& all, const PairBundle& bundle, std::size_t lane,
+                                      Coordinates& y) {
+  for (std::int32_t k = bundle.count - 1; k > 0; --k) {
+    BundleContact& c = all.contacts[bundle.first + k];
+    const Block8* rows = RowsOf(all, bundle, k);
+    Vector u;
+    ReadRows(bundle, c, rows, 1, y, lane, &u);
+    const Vector change = SolveNormal(bundle, c, u, lane);
+    MoveCoordinates(bundle, c, rows, 1, &change, lane, y);
+  }
+}
+
 HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motion) {
   const Lanes d;
   for (std::size_t i = 0; i < all.count; ++i) {
@@ -126,14 +145,15 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
       Works works{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
       Coordinates y(all, bundle);
       ReadCoordinates(all, bundle, motion, lane, y);
+      if (!backward) SweepNormals(all, bundle, lane, y);
       for (std::int32_t j = 0; j < bundle.count; ++j) {
         const std::int32_t k = backward ? bundle.count - 1 - j : j;
         BundleContact& c = all.contacts[bundle.first + k];
         const Block8* rows = RowsOf(all, bundle, k);
         Vector u[3], change[3];
-        ReadRows(bundle, c, rows, y, lane, u);
+        ReadRows(bundle, c, rows, 3, y, lane, u);
         SolveOne(bundle, c, u, lane, change);
-        MoveCoordinates(bundle, c, rows, change, lane, y);
+        MoveCoordinates(bundle, c, rows, 3, change, lane, y);
         if (bundle.rolls) RollOne(bundle, c, y.sides, lane);
         if (backward)
           AddUp(c, lane);
@@ -165,8 +185,9 @@ HWY_ATTR void PushBundles(const BundleArrays& all, bool backward, Block8* pushes
     for (std::size_t lane = 0; lane < kBundleLanes && bundle.overlaps; lane += kLanesAtOnce) {
       Sides sides;
       ReadSides(bundle, bundle.frame, pushes, lane, sides);
-      for (std::int32_t k = 0; k < bundle.count; ++k)
-        PushOne(all.contacts[bundle.first + (backward ? bundle.count - 1 - k : k)], sides, lane);
+      const auto push = [&](std::int32_t k) HWY_ATTR { PushOne(all.contacts[bundle.first + k], sides, lane); };
+      for (std::int32_t k = bundle.count - 1; k > 0; --k) push(backward ? bundle.count - 1 - k : k);
+      for (std::int32_t k = 0; k < bundle.count; ++k) push(backward ? bundle.count - 1 - k : k);
       WriteSides(bundle, bundle.frame, all.standing, pushes, lane, sides);
     }
   }
@@ -183,7 +204,7 @@ HWY_ATTR void FindResiduals(const BundleArrays& all, const Block8* motion) {
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         const BundleContact& c = all.contacts[bundle.first + k];
         Vector u[3];
-        ReadRows(bundle, c, RowsOf(all, bundle, k), y, lane, u);
+        ReadRows(bundle, c, RowsOf(all, bundle, k), 3, y, lane, u);
         const Vector approach = Approach(c, u[0], lane);
         const auto presses = hn::Gt(Get(c.force[0], lane), hn::Zero(d));
         const auto is_there = hn::Gt(Get(c.inverse_normal, lane), hn::Zero(d));
@@ -204,7 +225,7 @@ HWY_ATTR void ApplyBundleForces(const BundleArrays& all, Block8* motion) {
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         const BundleContact& c = all.contacts[bundle.first + k];
         const Vector by[3] = {Get(c.force[0], lane), Get(c.force[1], lane), Get(c.force[2], lane)};
-        MoveCoordinates(bundle, c, RowsOf(all, bundle, k), by, lane, y);
+        MoveCoordinates(bundle, c, RowsOf(all, bundle, k), 3, by, lane, y);
         const Vector moment[3] = {Get(c.moment[0], lane), Get(c.moment[1], lane), Get(c.moment[2], lane)};
         if (bundle.rolls) TurnSides(bundle, moment, y.sides, lane);
       }
