@@ -121,6 +121,15 @@ TEST(Components, ShellsUnderOneNameAreProposedForMerging) {
   EXPECT_THAT(assembly.proposals[0].components, ::testing::ElementsAre(0, 1));
 }
 
+TEST(Components, ANameThatAllShellsShareNamesNone) {
+  auto input = together({{"assembly", box({0, 0, 0}, {1, 1, 1})}, {"assembly", box({3, 0, 0}, {4, 1, 1})}});
+  EXPECT_THAT(names(find_components(input)), ::testing::ElementsAre("part 1", "part 2"));
+  input.groups[0].material = "steel", input.groups[1].material = "rubber";
+  EXPECT_THAT(names(find_components(input)), ::testing::ElementsAre("steel", "rubber"));
+  EXPECT_THAT(names(find_components(together({{"assembly", box({0, 0, 0}, {1, 1, 1})}}))),
+              ::testing::ElementsAre("assembly"));
+}
+
 TEST(Components, MergedAndRenamedPartsKeepAllTheirFaces) {
   const auto input =
       together({{"a", box({0, 0, 0}, {1, 1, 1})}, {"b", box({3, 0, 0}, {4, 1, 1})}, {"c", box({6, 0, 0}, {7, 1, 1})}});

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <unordered_map>
 #include <unordered_set>
@@ -87,13 +88,25 @@ std::vector<Index> shells_by_index(const SurfaceMesh& surface) {
   return label;
 }
 
-/// Names of shells: that of the group that holds the shell's first triangle, numbered where several share it.
-std::vector<std::string> shell_names(const GroupedSurface& input, const std::vector<Index>& label) {
+/// What the file calls the group of each shell's first triangle: its name, or else material. A name that all shells
+/// share tells none from another, so it is left out.
+std::vector<std::string> drawn_names(const GroupedSurface& input, const std::vector<Index>& label) {
   const auto group_of = group_of_triangles(input);
   std::vector<std::string> names;
-  for (std::size_t t = 0; t < label.size(); ++t)
-    if (label[t] == static_cast<Index>(names.size()))
-      names.push_back(input.groups[static_cast<std::size_t>(group_of[t])].name);
+  for (const auto which : {&SurfaceGroup::name, &SurfaceGroup::material}) {
+    names.clear();
+    for (std::size_t t = 0; t < label.size(); ++t)
+      if (label[t] == static_cast<Index>(names.size()))
+        names.push_back(input.groups[static_cast<std::size_t>(group_of[t])].*which);
+    if (names.size() == 1 || std::adjacent_find(names.begin(), names.end(), std::not_equal_to<>()) != names.end())
+      return names;
+  }
+  return std::vector<std::string>(names.size());
+}
+
+/// Names of shells, numbered where several share one.
+std::vector<std::string> shell_names(const GroupedSurface& input, const std::vector<Index>& label) {
+  std::vector<std::string> names = drawn_names(input, label);
   std::unordered_map<std::string, int> shared, seen;
   std::unordered_set<std::string> taken;
   for (const auto& name : names) ++shared[name];
