@@ -81,8 +81,9 @@ std::string neighbour(const char* name) {
   return !failed && fs::exists(beside, failed) ? beside.string() : name;
 }
 
-/// As asked, or else as the file of a mesh says; z where it does not.
-UpAxis up_axis(const std::string& asked, char of_file) {
+/// As asked, or else as the file of a mesh says; none where it does not.
+std::optional<UpAxis> up_axis(const std::string& asked, char of_file) {
+  if (asked.empty() && of_file == 0) return std::nullopt;
   return (asked.empty() ? of_file == 'y' : asked == "y") ? UpAxis::kY : UpAxis::kZ;
 }
 
@@ -204,7 +205,7 @@ int main(int argc, char** argv) {
   program.options()
       .add_option("--up", arguments.up,
                   "of an asset or assembly: the axis of its mesh that points up; by default what an assembly's file "
-                  "says, else z")
+                  "says, y for an asset baked from glTF, else z")
       ->check(CLI::IsMember({"y", "z"}));
   return program.run(argc, argv, [&] { limber::tools::view(program, arguments); });
 }

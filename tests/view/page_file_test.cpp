@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "block_model.h"
 #include "folders.h"
@@ -178,6 +179,20 @@ TEST(PageFile, AnAssetDrawnWithYUpStandsUpright) {
   const BodyPlacement placed = read_scene(folder.path / "s.json").bodies[0].placement;
   EXPECT_NEAR((placed.pose.q * Vec3::UnitY() - Vec3::UnitZ()).norm(), 0.0, 1e-12);
   EXPECT_NEAR(placed.pose.p.z(), 1.5 + 1.5, 1e-6) << "its lowest point half its height above the ground";
+}
+
+TEST(PageFile, AnAssetThatWasBakedFromGltfStandsUpright) {
+  const Folder folder("page_file_gltf");
+  for (const auto& [input, y_up] : std::vector<std::pair<const char*, bool>>{
+           {"duck.glb", true}, {"duck.gltf", true}, {"duck.obj", false}, {"", false}}) {
+    write_asset(folder.path / "b.glb", {.bodies = {testing::block_model(1)}, .provenance = {.input = input}});
+    const auto turned = [&](std::optional<UpAxis> up) {
+      const auto scene = nlohmann::json::parse(page_of_asset(folder.path / "b.glb", up).files[1].bytes);
+      return scene["bodies"][0].contains("orientation");
+    };
+    EXPECT_EQ(turned({}), y_up) << input;
+    EXPECT_FALSE(turned(UpAxis::kZ)) << input;
+  }
 }
 
 TEST(PageFile, WhatIsWrongIsToldBeforeThereIsAPage) {

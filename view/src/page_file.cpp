@@ -68,6 +68,11 @@ class Renamed {
   std::map<std::filesystem::path, std::string> names_;
 };
 
+UpAxis up_of_source(const Asset& asset) {
+  const std::string format = std::filesystem::path(asset.provenance.input).extension().string();
+  return format == ".glb" || format == ".gltf" ? UpAxis::kY : UpAxis::kZ;
+}
+
 }  // namespace
 
 PageContent page_of_scene(const std::filesystem::path& path) {
@@ -93,9 +98,9 @@ PageContent page_of_scene(const std::filesystem::path& path) {
   return content;
 }
 
-PageContent page_of_asset(const std::filesystem::path& path, UpAxis up) {
+PageContent page_of_asset(const std::filesystem::path& path, std::optional<UpAxis> up) {
   const Asset asset = read_asset(path);
-  const Json scene = internal::scene_of_asset(asset, path.stem().string(), up);
+  const Json scene = internal::scene_of_asset(asset, path.stem().string(), up.value_or(up_of_source(asset)));
   const std::string name = "/scene/" + path.stem().string() + ".json";
   return {.scene = name,
           .files = {{"/scene/asset.glb", small_bytes(asset, false)},

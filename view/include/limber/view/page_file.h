@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,9 +38,9 @@ PageContent page_of_scene(const std::filesystem::path& scene);
 enum class UpAxis { kY, kZ };
 
 /// A scene made for an asset: a machine as it was drawn, on the ground where nothing ties it to the world; single
-/// bodies side by side, free ones fall on the ground from half their size.
-/// @throws InputError as read_asset()
-PageContent page_of_asset(const std::filesystem::path& asset, UpAxis up = UpAxis::kZ);
+/// bodies side by side, free ones fall on the ground from half their size. @param up none: y for what was baked from
+/// glTF (Provenance::input), whose format says so; else z @throws InputError as read_asset()
+PageContent page_of_asset(const std::filesystem::path& asset, std::optional<UpAxis> up = {});
 
 /// A model to be posed (limber/view/page_pose.h). @param name shown as the page's title. @param joints_name of the
 /// joints file, for messages @throws InputError where they do not go together
