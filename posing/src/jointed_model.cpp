@@ -126,6 +126,11 @@ Index JointedModel::part_named(const std::string& name) const {
 
 void JointedModel::validate() const {
   if (parts.empty()) throw InvalidArgument("JointedModel: there are no parts, expected one or more");
+  std::set<std::string> names;
+  for (const ModelPart& part : parts)
+    if (part.name.empty() || !names.insert(part.name).second)
+      throw InvalidArgument("JointedModel: a part is called " + in_quotes(part.name) +
+                            (part.name.empty() ? ", expected a name" : " as another is, expected a name of its own"));
   std::vector<Index> owner(surface.triangles.size(), -1);
   const auto vertices = static_cast<Index>(surface.vertices.size());
   for (std::size_t p = 0; p < parts.size(); ++p) {

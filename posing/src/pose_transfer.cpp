@@ -7,9 +7,11 @@ namespace limber::internal {
 namespace {
 
 /// The old cell that each new cell lies in.
-std::vector<const PlacedCell*> old_cells(const PoseStructure& from, const PoseStructure& to) {
+std::vector<const PlacedCell*> old_cells(const PoseStructure& from, const PoseStructure& to,
+                                         std::span<const Index> was) {
   std::vector<const PlacedCell*> out;
-  for (const PlacedCell& c : to.cells) out.push_back(&cell_nearest(from, c.part, c.cell.centre));
+  for (const PlacedCell& c : to.cells)
+    out.push_back(&cell_nearest(from, was[static_cast<std::size_t>(c.part)], c.cell.centre));
   return out;
 }
 
@@ -46,9 +48,9 @@ Mat3 nearest_rotation(const Mat3& m) {
   return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
 }
 
-Pose transferred(const PoseStructure& from, const Pose& pose, const PoseStructure& to) {
+Pose transferred(const PoseStructure& from, const Pose& pose, const PoseStructure& to, std::span<const Index> was) {
   std::vector<Fit> fits(to.bodies.size());
-  const auto sources = old_cells(from, to);
+  const auto sources = old_cells(from, to, was);
   for (std::size_t i = 0; i < to.cells.size(); ++i) {
     const PlacedCell& c = to.cells[i];
     const auto old = static_cast<std::size_t>(sources[i]->body);

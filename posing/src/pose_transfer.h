@@ -1,6 +1,8 @@
 // Poses that go over to other cells.
 #pragma once
 
+#include <span>
+
 #include "solver/pose_solver.h"
 
 namespace limber::internal {
@@ -9,8 +11,9 @@ namespace limber::internal {
 const PlacedCell& cell_nearest(const PoseStructure& structure, Index part, const Vec3& p);
 
 /// Best places of new bodies: each takes the motion of the old cells that lie where its own are, exactly if they move
-/// as one, else nearest in the mean square of their corners. Joints keep their turns.
-Pose transferred(const PoseStructure& from, const Pose& pose, const PoseStructure& to);
+/// as one, else nearest in the mean square of their corners. Joints keep their turns. @param was per new part the old
+/// one
+Pose transferred(const PoseStructure& from, const Pose& pose, const PoseStructure& to, std::span<const Index> was);
 
 /// The rotation that is nearest to a matrix: U diag(1, 1, det UVᵀ) Vᵀ of its singular value decomposition.
 Mat3 nearest_rotation(const Mat3& m);

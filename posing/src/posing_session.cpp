@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "limber/core/error.h"
@@ -31,7 +32,7 @@ struct Built {
 
 /// All that undo brings back.
 struct State {
-  std::vector<ModelJoint> joints{};
+  std::shared_ptr<const JointedModel> model{};
   std::vector<PartOptions> parts{};
   std::vector<bool> pinned{};
   std::vector<Handle> handles{};
@@ -47,7 +48,6 @@ void require_finite(const Vec3& p, const char* what) {
 }  // namespace
 
 struct PosingSession::Impl {
-  JointedModel model;
   PosingOptions options;
   std::shared_ptr<const PoseMethod> method{};  // null: PoseSolver
   State now{};
@@ -87,34 +87,66 @@ struct PosingSession::Impl {
   }
 
   /// Cells, bodies and joints anew; the pose goes over to them.
-  void rebuild() {
-    model.joints = now.joints;
-    PoseStructure structure = build_structure(model, now.parts, now.pinned, options.strain);
+  /// @param was per part its part in the cells that there are
+  void rebuild(std::span<const Index> was) {
+    PoseStructure structure = build_structure(*now.model, now.parts, now.pinned, options.strain);
     Pose pose{rest_poses(structure), std::vector<double>(structure.joints.size(), 0.0)};
-    if (now.built) pose = transferred(now.built->structure, now.pose, structure);
-    Skin skin(model, structure);
+    if (now.built) pose = transferred(now.built->structure, now.pose, structure, was);
+    Skin skin(*now.model, structure);
     now.built = std::make_shared<const Built>(Built{std::move(structure), std::move(skin)});
     now.pose = std::move(pose);
     now.affine.clear();
   }
 
+  std::vector<Index> same_parts() const {
+    std::vector<Index> parts(now.model->parts.size());
+    std::iota(parts.begin(), parts.end(), Index{0});
+    return parts;
+  }
+
   /// A change that needs new cells; taken back if it cannot be made.
   template <class Change>
   void change_structure(Change&& change) {
+    change_structure(change, same_parts());
+  }
+  template <class Change>
+  void change_structure(Change&& change, std::span<const Index> was) {
     begin_change();
     try {
       change();
-      rebuild();
+      rebuild(was);
     } catch (...) {
       take_back();
       throw;
     }
   }
 
+  /// A part's triangles with all vertices of the model.
+  SurfaceMesh surface_of(Index part) const {
+    SurfaceMesh surface{now.model->surface.vertices, {}};
+    for (const Index t : now.model->parts[static_cast<std::size_t>(part)].triangles)
+      surface.triangles.push_back(surface_triangle(*now.model, t));
+    return surface;
+  }
+  double distance(Index part, const Vec3& point) const {
+    const SurfaceMesh surface = surface_of(part);
+    return SurfaceLocator(surface.vertices, surface.triangles).nearest(point).distance;
+  }
+  /// The piece of a part that is nearest to a point at rest.
+  Index nearest_piece(std::span<const Index> was, Index part, const Vec3& point) const {
+    Index best = -1;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t p = 0; p < was.size(); ++p) {
+      if (was[p] != part) continue;
+      const double d = distance(static_cast<Index>(p), point);
+      if (d < least) least = d, best = static_cast<Index>(p);
+    }
+    return best;
+  }
+
   void take_back() {
     now = std::move(before.back());
     before.pop_back();
-    model.joints = now.joints;
     last_moved = -1;
     solver.reset();
   }
@@ -159,38 +191,34 @@ PosingSession::PosingSession(JointedModel model, const PosingOptions& options, s
     : impl_(std::make_unique<Impl>()) {
   options.validate();
   model.validate();
-  impl_->model = std::move(model);
   impl_->options = options;
   impl_->method = std::move(method);
-  impl_->now.joints = impl_->model.joints;
-  impl_->now.parts.resize(impl_->model.parts.size());
-  impl_->now.pinned.assign(impl_->model.parts.size(), false);
-  impl_->rebuild();
+  impl_->now.parts.resize(model.parts.size());
+  impl_->now.pinned.assign(model.parts.size(), false);
+  impl_->now.model = std::make_shared<const JointedModel>(std::move(model));
+  impl_->rebuild({});
 }
 PosingSession::~PosingSession() = default;
 PosingSession::PosingSession(PosingSession&&) noexcept = default;
 PosingSession& PosingSession::operator=(PosingSession&&) noexcept = default;
 
-const JointedModel& PosingSession::model() const { return impl_->model; }
+const JointedModel& PosingSession::model() const { return *impl_->now.model; }
 const PosingOptions& PosingSession::options() const { return impl_->options; }
 
 PoseHandle PosingSession::add_handle(Index part, const Vec3& point) {
-  impl_->require(part, impl_->model.parts.size(), "part");
+  impl_->require(part, model().parts.size(), "part");
   require_finite(point, "the handle's point");
-  SurfaceMesh surface{impl_->model.surface.vertices, {}};
+  const SurfaceMesh surface = impl_->surface_of(part);
   Eigen::AlignedBox3d box;
-  for (const Index t : impl_->model.parts[static_cast<std::size_t>(part)].triangles) {
-    surface.triangles.push_back(surface_triangle(impl_->model, t));
-    for (const Index v : surface.triangles.back()) box.extend(surface.vertices[static_cast<std::size_t>(v)]);
-  }
-  const double distance = SurfaceLocator(surface.vertices, surface.triangles).nearest(point).distance;
+  for (const Triangle& t : surface.triangles)
+    for (const Index v : t) box.extend(surface.vertices[static_cast<std::size_t>(v)]);
+  const double distance = impl_->distance(part, point);
   constexpr double kReach = 0.1;  // of the part's diagonal
   if (distance > kReach * box.diagonal().norm())
-    throw InvalidArgument("PosingSession: the handle's point (" + std::to_string(point.x()) + ", " +
-                          std::to_string(point.y()) + ", " + std::to_string(point.z()) + ") is " +
-                          std::to_string(distance) + " from the surface of " +
-                          in_quotes(impl_->model.parts[static_cast<std::size_t>(part)].name) +
-                          ", expected a tenth of its diagonal at most");
+    throw InvalidArgument(
+        "PosingSession: the handle's point (" + std::to_string(point.x()) + ", " + std::to_string(point.y()) + ", " +
+        std::to_string(point.z()) + ") is " + std::to_string(distance) + " from the surface of " +
+        in_quotes(model().parts[static_cast<std::size_t>(part)].name) + ", expected a tenth of its diagonal at most");
   impl_->begin_change();
   Handle h{.number = impl_->next_handle++, .part = part, .point = point, .target = {}};
   h.target = impl_->place_of(h);
@@ -223,32 +251,58 @@ Vec3 PosingSession::handle_point(PoseHandle handle) const { return impl_->place_
 Vec3 PosingSession::handle_target(PoseHandle handle) const { return impl_->handle(handle).target; }
 
 void PosingSession::set_pinned(Index part, bool pinned) {
-  impl_->require(part, impl_->model.parts.size(), "part");
+  impl_->require(part, model().parts.size(), "part");
   if (impl_->now.pinned[static_cast<std::size_t>(part)] == pinned) return;
   impl_->change_structure([&] { impl_->now.pinned[static_cast<std::size_t>(part)] = pinned; });
 }
 
 bool PosingSession::pinned(Index part) const {
-  impl_->require(part, impl_->model.parts.size(), "part");
+  impl_->require(part, model().parts.size(), "part");
   return impl_->now.pinned[static_cast<std::size_t>(part)];
 }
 
 void PosingSession::set_part(Index part, const PartOptions& options) {
-  impl_->require(part, impl_->model.parts.size(), "part");
+  impl_->require(part, model().parts.size(), "part");
   options.validate();
   if (impl_->now.parts[static_cast<std::size_t>(part)] == options) return;
   impl_->change_structure([&] { impl_->now.parts[static_cast<std::size_t>(part)] = options; });
 }
 
 PartOptions PosingSession::part_options(Index part) const {
-  impl_->require(part, impl_->model.parts.size(), "part");
+  impl_->require(part, model().parts.size(), "part");
   return impl_->now.parts[static_cast<std::size_t>(part)];
 }
 
 void PosingSession::set_joint(Index joint, const JointSpec& spec) {
-  impl_->require(joint, impl_->now.joints.size(), "joint");
+  impl_->require(joint, model().joints.size(), "joint");
   spec.validate();
-  impl_->change_structure([&] { impl_->now.joints[static_cast<std::size_t>(joint)].joint = spec; });
+  JointedModel changed = model();
+  changed.joints[static_cast<std::size_t>(joint)].joint = spec;
+  impl_->change_structure([&] { impl_->now.model = std::make_shared<const JointedModel>(std::move(changed)); });
+}
+
+void PosingSession::set_model(JointedModel model, std::span<const Index> was) {
+  model.validate();
+  if (was.size() != model.parts.size())
+    throw InvalidArgument("PosingSession::set_model: was names " + std::to_string(was.size()) + " parts, expected " +
+                          std::to_string(model.parts.size()) + ", those of the model");
+  for (const Index p : was) impl_->require(p, impl_->now.parts.size(), "part");
+  std::vector<PartOptions> parts;
+  std::vector<bool> pinned, given(impl_->now.parts.size(), false);
+  for (const Index p : was) {
+    const auto old = static_cast<std::size_t>(p);
+    parts.push_back(impl_->now.parts[old]);
+    pinned.push_back(impl_->now.pinned[old] && !given[old]);
+    given[old] = true;
+  }
+  impl_->change_structure(
+      [&] {
+        impl_->now.model = std::make_shared<const JointedModel>(std::move(model));
+        impl_->now.parts = std::move(parts), impl_->now.pinned = std::move(pinned);
+        std::erase_if(impl_->now.handles, [&](const Handle& h) { return !given[static_cast<std::size_t>(h.part)]; });
+        for (Handle& h : impl_->now.handles) h.part = impl_->nearest_piece(was, h.part, h.point);
+      },
+      was);
 }
 
 bool PosingSession::undo() {
@@ -295,10 +349,10 @@ std::vector<PosedCell> PosingSession::cells() const {
 }
 
 PosedJoint PosingSession::joint(Index joint) const {
-  impl_->require(joint, impl_->now.joints.size(), "joint");
+  impl_->require(joint, model().joints.size(), "joint");
   const PoseStructure& s = impl_->now.built->structure;
   PosedJoint out;
-  const ModelJoint& told = impl_->now.joints[static_cast<std::size_t>(joint)];
+  const ModelJoint& told = model().joints[static_cast<std::size_t>(joint)];
   const Vec3& origin = told.joint.frame.origin;
   Index a = impl_->body_at(told.a, origin),
         b = impl_->body_at(told.b, origin);  // of joints that hold nothing: one body
@@ -319,7 +373,7 @@ PosedJoint PosingSession::joint(Index joint) const {
 }
 
 std::optional<RigidTransform> PosingSession::motion(Index part) const {
-  impl_->require(part, impl_->model.parts.size(), "part");
+  impl_->require(part, model().parts.size(), "part");
   const PoseStructure& s = impl_->now.built->structure;
   const Index group = s.group_of_part[static_cast<std::size_t>(part)];
   if (impl_->now.parts[static_cast<std::size_t>(part)].cells != Subdivision::kRigid ||
@@ -331,9 +385,9 @@ std::optional<RigidTransform> PosingSession::motion(Index part) const {
 }
 
 void PosingSession::reconstruct(std::span<Vec3> positions) const {
-  if (positions.size() != impl_->model.surface.vertices.size())
+  if (positions.size() != model().surface.vertices.size())
     throw InvalidArgument("PosingSession.reconstruct: room for " + std::to_string(positions.size()) +
-                          " vertices, expected " + std::to_string(impl_->model.surface.vertices.size()));
+                          " vertices, expected " + std::to_string(model().surface.vertices.size()));
   impl_->now.built->skin.positions(impl_->maps(), positions);
 }
 
@@ -342,7 +396,7 @@ void PosingSession::reconstruct(std::span<Vec3> positions, std::span<Vec3> norma
   if (normals.size() != positions.size())
     throw InvalidArgument("PosingSession.reconstruct: room for " + std::to_string(normals.size()) +
                           " normals, expected " + std::to_string(positions.size()));
-  vertex_normals(positions, impl_->model.surface.triangles, normals);
+  vertex_normals(positions, model().surface.triangles, normals);
 }
 
 }  // namespace limber

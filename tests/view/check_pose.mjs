@@ -115,7 +115,7 @@ async function bends(page) {
   await page.locator('#panel button:has-text("Back to rest")').click();
   await page.locator('#panel select').first().selectOption('fixed');
   const rest = await pull(page, await onScreen(page, 1), [0, -60]);
-  await page.locator('#panel .part:has-text("arm") input').first().check();
+  await page.locator('#panel .part').nth(1).locator('input[type="checkbox"]').first().check();
   const bent = await settled(page);
   check((await page.evaluate(() => globalThis.limber.engine.scene.parts[1].soft)) === true, 'a part is made soft');
   check(moved(bent, rest) > 0.02, `it bends, by ${moved(bent, rest)}`);
@@ -123,6 +123,9 @@ async function bends(page) {
 }
 
 async function isSaved(page) {
+  const name = page.locator('#panel .part input[type="text"]').nth(1);
+  await name.fill('<i>boom</i>');
+  await name.press('Enter');
   const files = [];
   page.on('download', (file) => files.push(file));
   await page.locator('#panel button:has-text("Save")').click();
@@ -131,7 +134,7 @@ async function isSaved(page) {
   if (!saved) return;
   const texts = await Promise.all(files.map(async (file) => readFileSync(await file.path(), 'utf8')));
   check(texts.some((text) => /^v /m.test(text) && /^f /m.test(text)), 'one is a model');
-  check(texts.some((text) => text.startsWith('{"components"')), 'one its joints');
+  check(texts.some((text) => text.startsWith('{"components"') && text.includes('"<i>boom</i>"')), 'one its joints, of parts by the names that they were given');
 }
 
 await run('check_pose', file, async () => {
@@ -145,7 +148,7 @@ await run('check_pose', file, async () => {
     await bends(page);
     await isSaved(page);
     await isCut(page);
-    check((await page.evaluate(() => document.querySelectorAll('img, iframe, object, embed, b').length)) === 0, 'no text has become markup');
+    check((await page.evaluate(() => document.querySelectorAll('img, iframe, object, embed, b, i').length)) === 0, 'no text has become markup');
   }
   await page.close();
 });

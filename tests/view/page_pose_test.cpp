@@ -47,7 +47,6 @@ class PagePoseTest : public ::testing::Test {
   ~PagePoseTest() override { std::filesystem::remove_all(folder_); }
   PagePose page() const { return PagePose(folder_ / "bars.obj", folder_ / "bars.json"); }
 
- private:
   const std::filesystem::path folder_ =
       std::filesystem::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name();
 };
@@ -177,10 +176,62 @@ TEST_F(PagePoseTest, ACutMakesAPartOfItsOwnOnABall) {
   EXPECT_FALSE(pose.undo());
 }
 
+TEST_F(PagePoseTest, ACutKeepsThePoseItsHandlesAndPins) {
+  PagePose pose = page();
+  pose.grab(tip(pose));
+  pose.drag_to({1.9, 0.1, 0.5});
+  settle(pose);
+  const std::vector<float> before(pose.positions().begin(), pose.positions().end());
+  const double turned = turn(pose);
+  pose.cut(1, across_arm(1.6));
+  ASSERT_GE(pose.positions().size(), before.size());
+  for (std::size_t i = 0; i < before.size(); ++i) EXPECT_NEAR(pose.positions()[i], before[i], 1e-6);
+  EXPECT_NEAR(turn(pose), turned, 1e-12);
+  ASSERT_EQ(pose.handles().size(), 6u);
+  EXPECT_NEAR(pose.handles()[2], pose.handles()[5], 0.02) << "the point is still near its target";
+  pose.take(0);
+  pose.drag_to({1.9, 0.1, 0.3});
+  settle(pose);
+  EXPECT_TRUE(told(pose)["parts"][0]["pinned"]);
+  EXPECT_TRUE(pose.undo() && pose.undo());
+  ASSERT_EQ(pose.positions().size(), before.size());
+  for (std::size_t i = 0; i < before.size(); ++i) EXPECT_NEAR(pose.positions()[i], before[i], 1e-6);
+}
+
+TEST_F(PagePoseTest, ShellsGoToTheSideWhereTheyLie) {
+  write_file(folder_ / "all.json", R"({"components": [{"name": "all", "faces": [[0, 12]]}], "joints": []})");
+  PagePose pose(folder_ / "bars.obj", folder_ / "all.json");
+  pose.cut(0, across_arm(0.5));  // the first bar alone
+  ASSERT_EQ(told(pose)["parts"].size(), 2u);
+  const JointedModel& model = pose.session().model();
+  for (std::size_t p = 0; p < 2; ++p)
+    for (const Index t : model.parts[p].triangles)
+      for (const Index v : model.surface.triangles[static_cast<std::size_t>(t)])
+        EXPECT_GE((p == 0 ? 1.0 : -1.0) * (model.surface.vertices[static_cast<std::size_t>(v)].x() - 0.5), -1e-9);
+}
+
+TEST_F(PagePoseTest, APartIsRenamedInWhatIsSaved) {
+  PagePose pose = page();
+  pose.set_name(1, "boom");
+  EXPECT_EQ(told(pose)["joints"][0]["b"], "boom");
+  EXPECT_THAT(pose.joints_text(), ::testing::HasSubstr("\"boom\""));
+  EXPECT_THROW(pose.set_name(1, "base"), InvalidArgument);
+  EXPECT_THROW(pose.set_name(1, ""), InvalidArgument);
+  EXPECT_THROW(pose.set_name(2, "stick"), InvalidArgument);
+  EXPECT_TRUE(pose.undo());
+  EXPECT_EQ(told(pose)["parts"][1]["name"], "arm");
+}
+
 TEST_F(PagePoseTest, ACutThatEndsInsideIsRefused) {
   PagePose pose = page();
   const std::string before = pose.description();
-  EXPECT_THROW(pose.cut(1, across_arm(1.6, 0.1)), InvalidArgument);
+  try {
+    pose.cut(1, across_arm(1.6, 0.1));
+    FAIL();
+  } catch (const InvalidArgument& e) {
+    EXPECT_THAT(e.what(),
+                ::testing::ContainsRegex("meets [1-9][0-9]* edges of part \"arm\".*expected a line right across"));
+  }
   EXPECT_THROW(pose.cut(1, across_arm(9.0)), InvalidArgument);
   EXPECT_THROW(pose.cut(7, across_arm(1.6)), InvalidArgument);
   EXPECT_EQ(pose.description(), before);

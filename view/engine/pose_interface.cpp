@@ -70,6 +70,9 @@ EMSCRIPTEN_KEEPALIVE void pose_drag_to(double x, double y, double z) { pose->dra
 EMSCRIPTEN_KEEPALIVE void pose_let_go() { pose->let_go(); }
 EMSCRIPTEN_KEEPALIVE void pose_remove_handles() { pose->remove_handles(); }
 
+EMSCRIPTEN_KEEPALIVE int pose_set_name(int part, const char* name) {
+  return safely([&] { pose->set_name(static_cast<Index>(part), name); });
+}
 EMSCRIPTEN_KEEPALIVE int pose_set_pinned(int part, int pinned) {
   return safely([&] { pose->set_pinned(static_cast<Index>(part), pinned != 0); });
 }

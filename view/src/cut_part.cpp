@@ -12,6 +12,7 @@
 
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
+#include "limber/internal/strict_json.h"
 
 namespace limber::internal {
 namespace {
@@ -28,7 +29,8 @@ class Blade {
         across_(stroke.from.cross(stroke.to).normalized()),
         before_(across_.cross(stroke.from)),
         behind_(stroke.to.cross(across_)) {
-    if (!across_.allFinite() || across_.norm() < 0.5) throw InvalidArgument("PagePose::cut: the stroke has no length");
+    if (!across_.allFinite() || across_.norm() < 0.5)
+      throw InvalidArgument("PagePose::cut: the line has no length, expected one across a part: draw it longer");
   }
   double height(const Vec3& p) const { return (p - eye_).dot(across_); }
   bool between(const Vec3& p) const { return (p - eye_).dot(before_) > 0.0 && (p - eye_).dot(behind_) > 0.0; }
@@ -103,36 +105,65 @@ double area_of(const SurfaceMesh& surface, Index triangle) {
   return 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
 }
 
-/// The triangles of a part that a seam takes off: all pieces beside it but the largest.
-std::vector<bool> taken_off(const JointedModel& model, const ModelPart& part, const std::set<Index>& seam) {
+/// What hangs together of a part once the seam is cut.
+struct Piece {
+  double area = 0.0, height = 0.0;                             // over the blade, the sum over its area
+  bool beside_above = false, beside_below = false;             // it meets the seam from there
+  bool whole() const { return beside_above == beside_below; }  // the seam is not its edge
+  bool above() const { return whole() ? height > 0.0 : beside_above; }
+};
+
+/// Per triangle of the part its piece. Pieces meet at edges that are not of the seam.
+std::vector<Index> pieces_of(const JointedModel& model, const ModelPart& part, const std::set<Index>& seam) {
   DisjointSets pieces(part.triangles.size());
   std::map<Edge, Index> first;
-  std::vector<Index> beside;
   for (std::size_t i = 0; i < part.triangles.size(); ++i) {
     const Triangle& t = model.surface.triangles[static_cast<std::size_t>(part.triangles[i])];
     for (std::size_t k = 0; k < 3; ++k) {
       const Edge edge = edge_of(t[k], t[(k + 1) % 3]);
-      if (seam.contains(edge.first) && seam.contains(edge.second))
-        beside.push_back(static_cast<Index>(i));
-      else if (const auto [found, fresh] = first.emplace(edge, static_cast<Index>(i)); !fresh)
+      if (seam.contains(edge.first) && seam.contains(edge.second)) continue;
+      if (const auto [found, fresh] = first.emplace(edge, static_cast<Index>(i)); !fresh)
         pieces.join(found->second, static_cast<Index>(i));
     }
   }
-  std::map<Index, double> areas;  // of the pieces beside the seam
-  for (const Index i : beside) areas[pieces.root(i)] = 0.0;
-  if (areas.size() < 2)
-    throw InvalidArgument("the line does not go right across the part: draw it from beside to beside");
-  for (std::size_t i = 0; i < part.triangles.size(); ++i)
-    if (const auto found = areas.find(pieces.root(static_cast<Index>(i))); found != areas.end())
-      found->second += area_of(model.surface, part.triangles[i]);
-  const Index largest = std::max_element(areas.begin(), areas.end(), [](const auto& a, const auto& b) {
-                          return a.second < b.second;
-                        })->first;
-  std::vector<bool> taken;
-  for (std::size_t i = 0; i < part.triangles.size(); ++i) {
-    const Index root = pieces.root(static_cast<Index>(i));
-    taken.push_back(root != largest && areas.contains(root));
+  return pieces.labels();
+}
+
+/// @param heights of the model's vertices over the blade, as they are seen
+void add_triangle(const JointedModel& model, Index triangle, const std::set<Index>& seam,
+                  const std::vector<double>& heights, Piece& piece) {
+  const double area = area_of(model.surface, triangle);
+  piece.area += area;
+  const Triangle& t = model.surface.triangles[static_cast<std::size_t>(triangle)];
+  const auto on_seam = std::count_if(t.begin(), t.end(), [&](Index v) { return seam.contains(v); });
+  for (const Index v : t) {
+    const double height = heights[static_cast<std::size_t>(v)];
+    piece.height += area * height / 3.0;
+    if (on_seam < 2 || seam.contains(v)) continue;
+    (height > 0.0 ? piece.beside_above : piece.beside_below) = true;
   }
+}
+
+/// Per triangle of the part whether it goes: with the side of the blade that has less of the part's area.
+std::vector<bool> taken_off(const JointedModel& model, const ModelPart& part, const std::set<Index>& seam,
+                            const std::vector<double>& heights) {
+  const std::vector<Index> piece_of = pieces_of(model, part, seam);
+  std::vector<Piece> pieces(1 + static_cast<std::size_t>(*std::max_element(piece_of.begin(), piece_of.end())));
+  for (std::size_t i = 0; i < piece_of.size(); ++i)
+    add_triangle(model, part.triangles[i], seam, heights, pieces[static_cast<std::size_t>(piece_of[i])]);
+  double above = 0.0, below = 0.0;
+  bool cut_above = false, cut_below = false;
+  for (const Piece& piece : pieces) {
+    (piece.above() ? above : below) += piece.area;
+    if (!piece.whole()) (piece.above() ? cut_above : cut_below) = true;
+  }
+  if (!cut_above || !cut_below)
+    throw InvalidArgument(
+        "PagePose::cut: the line meets " + std::to_string(seam.size()) + " edges of part " + in_quotes(part.name) +
+        " and leaves it in one piece, expected a line right across: " + "begin and end it beside the part");
+  std::vector<bool> taken;
+  for (const Index piece : piece_of)
+    taken.push_back(pieces[static_cast<std::size_t>(piece)].above() == (above < below));
   return taken;
 }
 
@@ -184,15 +215,19 @@ void share_joints(JointedModel& model, Index part, Index taken) {
 
 JointedModel cut_part(const JointedModel& model, Index part, const PoseStroke& stroke, std::span<const Vec3> posed) {
   if (part < 0 || static_cast<std::size_t>(part) >= model.parts.size())
-    throw InvalidArgument("PagePose::cut: there is no part " + std::to_string(part));
+    throw InvalidArgument("PagePose::cut: there is no part " + std::to_string(part) + ", expected 0 to " +
+                          std::to_string(model.parts.size() - 1));
   JointedModel out = model;
-  const std::map<Edge, Index> cuts =
-      cut_edges(out.surface, model.parts[static_cast<std::size_t>(part)], Blade(stroke), posed);
+  const Blade blade(stroke);
+  const std::map<Edge, Index> cuts = cut_edges(out.surface, model.parts[static_cast<std::size_t>(part)], blade, posed);
   split_triangles(out, cuts);
+  std::vector<double> heights;  // 0 on the seam
+  for (const Vec3& p : posed) heights.push_back(blade.height(p));
+  heights.resize(out.surface.vertices.size(), 0.0);
   std::set<Index> seam;
   for (const auto& cut : cuts) seam.insert(cut.second);
   const ModelPart whole = out.parts[static_cast<std::size_t>(part)];
-  const std::vector<bool> goes = taken_off(out, whole, seam);
+  const std::vector<bool> goes = taken_off(out, whole, seam, heights);
   ModelPart rest{.name = whole.name, .triangles = {}}, taken{.name = free_name(model), .triangles = {}};
   for (std::size_t i = 0; i < whole.triangles.size(); ++i)
     (goes[i] ? taken : rest).triangles.push_back(whole.triangles[i]);

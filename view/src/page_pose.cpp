@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <optional>
-#include <tuple>
 #include <utility>
 
 #include "cut_part.h"
@@ -46,25 +46,30 @@ Mat3 axes_for(const JointSpec& joint, JointType type) {
   return axes;
 }
 
+std::size_t checked(const JointedModel& model, Index part, const char* function) {
+  if (part < 0 || static_cast<std::size_t>(part) >= model.parts.size())
+    throw InvalidArgument(std::string("PagePose::") + function + ": there is no part " + std::to_string(part) +
+                          ", expected 0 to " + std::to_string(model.parts.size() - 1));
+  return static_cast<std::size_t>(part);
+}
+
 }  // namespace
 
 struct PagePose::Impl {
-  explicit Impl(JointedModel model, std::string told) : session(session_of(std::move(model))), name(std::move(told)) {
+  explicit Impl(JointedModel model, std::string told)
+      : session(std::move(model), {.max_iterations = kIterations, .starts = 0}), name(std::move(told)) {
     session.set_pinned(0, true);
     session.forget_changes();
-    list_triangles();
-    place();
+    parts_changed();
   }
 
-  static PosingSession session_of(JointedModel model) {
-    return PosingSession(std::move(model), {.max_iterations = kIterations, .starts = 0});
-  }
-  void list_triangles() {
+  void parts_changed() {
     triangles.clear();
     for (const ModelPart& part : session.model().parts)
       for (const Index t : part.triangles)
         for (const Index v : session.model().surface.triangles[static_cast<std::size_t>(t)])
           triangles.push_back(static_cast<std::uint32_t>(v));
+    place();
   }
 
   /// The vertices' present places.
@@ -81,7 +86,6 @@ struct PagePose::Impl {
   }
 
   PosingSession session;
-  std::vector<std::pair<PosingSession, std::vector<PoseHandle>>> uncut;  // before each cut, and the handles then
   std::string name;
   std::vector<std::uint32_t> triangles;
   std::vector<PoseHandle> made;  // all that ever were
@@ -224,32 +228,29 @@ void PagePose::set_joint(Index joint, std::string_view told) {
   impl_->session.set_joint(joint, spec);
 }
 
+void PagePose::set_name(Index part, const std::string& name) {
+  Impl& m = *impl_;
+  JointedModel model = m.session.model();
+  std::vector<Index> was(model.parts.size());
+  std::iota(was.begin(), was.end(), Index{0});
+  model.parts[checked(model, part, "set_name")].name = name;
+  m.session.set_model(std::move(model), was);
+}
+
 void PagePose::cut(Index part, const PoseStroke& stroke) {
   Impl& m = *impl_;
-  PosingSession next = Impl::session_of(internal::cut_part(m.session.model(), part, stroke, m.posed));
-  const auto taken = static_cast<Index>(next.model().parts.size()) - 1;
-  for (Index p = 0; p <= taken; ++p) {
-    next.set_part(p, m.session.part_options(p == taken ? part : p));
-    next.set_pinned(p, p != taken && m.session.pinned(p));
-  }
-  next.forget_changes();
-  m.uncut.emplace_back(std::exchange(m.session, std::move(next)), std::exchange(m.made, {}));
-  m.held = {};
-  m.list_triangles();
-  m.place();
+  const JointedModel& whole = m.session.model();
+  checked(whole, part, "cut");
+  std::vector<Index> was(whole.parts.size());
+  std::iota(was.begin(), was.end(), Index{0});
+  was.push_back(part);
+  m.session.set_model(internal::cut_part(whole, part, stroke, m.posed), was);
+  m.parts_changed();
 }
 
 bool PagePose::undo() {
-  Impl& m = *impl_;
-  bool done = m.session.undo();
-  if (!done && !m.uncut.empty()) {
-    std::tie(m.session, m.made) = std::move(m.uncut.back());
-    m.uncut.pop_back();
-    m.held = {};
-    m.list_triangles();
-    done = true;
-  }
-  m.place();
+  const bool done = impl_->session.undo();
+  impl_->parts_changed();
   return done;
 }
 

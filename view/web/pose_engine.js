@@ -49,6 +49,10 @@ export class PoseEngine {
   letGo() { this.module._pose_let_go(); }
   removeHandles() { this.module._pose_remove_handles(); }
 
+  setName(part, name) {
+    this.check(this.withTexts((text) => this.module._pose_set_name(part, text), name));
+    this.describe();
+  }
   setPinned(part, pinned) { this.check(this.module._pose_set_pinned(part, pinned ? 1 : 0)); this.describe(); }
   setSoft(part, soft) { this.check(this.module._pose_set_soft(part, soft ? 1 : 0)); this.describe(); }
   setJoint(joint, told) {

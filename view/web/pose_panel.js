@@ -39,7 +39,8 @@ export class PosePanel {
     const { app } = this;
     const box = (text, checked, act) => element('label', { className: 'box' }, element('input', { type: 'checkbox', checked,
       onchange: (event) => app.change(() => act(event.target.checked)) }), text);
-    return element('div', { className: 'part' }, element('span', { textContent: part.name }),
+    return element('div', { className: 'part' }, element('input', { type: 'text', value: part.name, title: 'Its name',
+      onchange: (event) => app.change(() => app.engine.setName(i, event.target.value.trim())) }),
       box('soft', part.soft, (on) => app.engine.setSoft(i, on)), box('pinned', part.pinned, (on) => app.engine.setPinned(i, on)));
   }
 

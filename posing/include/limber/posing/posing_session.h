@@ -91,6 +91,11 @@ class PosingSession {
   /// Another type, frame or other limits. If the pose does not meet them, the next solve() first puts it there.
   void set_joint(Index joint, const JointSpec& spec);
 
+  /// The model in other parts, or with other names, and with more joints behind those there were; its vertices, too, go
+  /// on behind those there were. Options go over to all pieces of a part, a pin to its first, handles to the nearest.
+  /// @param was per part the one that it is, or is a piece of @throws InvalidArgument from model.validate() too
+  void set_model(JointedModel model, std::span<const Index> was);
+
   /// Takes back the last change, pose included. @return false if there is none
   bool undo();
   /// What was changed so far is not taken back any more.

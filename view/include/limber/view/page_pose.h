@@ -57,15 +57,17 @@ class PagePose {
   void remove_handle();
   void remove_handles();
 
+  /// Written to the files too. @throws InvalidArgument for an empty name, or another part's
+  void set_name(Index part, const std::string& name);
   void set_pinned(Index part, bool pinned);
   /// Soft: a grid of cells a tenth of its diagonal wide.
   void set_soft(Index part, bool soft);
   /// @param told JSON, `type` and `limits` of the joints file. Another type keeps origin and axis
   /// @throws InputError naming the member
   void set_joint(Index joint, std::string_view told);
-  /// Cuts a part in two, right across: what is beyond the cut becomes the last part, on a ball (a virtual joint
-  /// [X09 4.4]). The pose goes back to rest, without handles.
-  /// @throws InvalidArgument where the stroke does not go right across the part
+  /// Cuts a part in two, right across: what is beyond the cut, less of it by area, becomes the last part, on a ball (a
+  /// virtual joint [X09 4.4]). The pose stays. @throws InvalidArgument where the stroke does not go right across the
+  /// part
   void cut(Index part, const PoseStroke& stroke);
   /// @return false where there is nothing to take back
   bool undo();
