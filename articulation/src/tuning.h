@@ -231,16 +231,10 @@ struct OtherHypothesesTuning {
 /// The line about which surfaces of two parts turn into themselves. Cases: KUKA's robots, whose 18 flanges all have
 /// their axis so (benchmarks/robot_joints.py).
 struct CommonLineTuning {
-  /// rad, 0.005 … 0.05: facets that bend by less are one face.
-  double least_bend = 0.026;
-  /// Sine, 0.1 … 0.5, of a normal and the direction: below it a face looks along the line and tells nothing of it.
-  double least_across = 0.3;
   /// Lines of normals, 200 … 3,000, the heaviest ones, that a place of the line is held against. A matter of time.
   std::size_t compared = 800;
   /// Of these, 20 … 200, those whose crossings are tried. A matter of time.
   std::size_t paired = 64;
-  /// Sine, 0.05 … 0.5: lines that cross by less tell no place.
-  double least_crossing = 0.17;
   /// Part of the radius looked at, 1e-4 … 5e-3: a line that passes by more does not meet.
   double off = 1e-3;
   /// Part of the weight, 0.01 … 0.2: the least of both directions across the line; a full turn has 0.5.

@@ -22,20 +22,21 @@ struct NormalLine {
   double distance(const Flat& c) const { return across.dot(c - point); }
 };
 
-/// The heaviest lines of what lies near.
+/// The heaviest lines of what lies near. A bend weighs by how far it looks across the line: a face that looks along it
+/// tells nothing of it.
 std::vector<NormalLine> lines_near(const std::vector<Bend>& bends, const Eigen::Matrix<double, 3, 2>& plane,
                                    const Vec3& middle, double radius) {
-  const CommonLineTuning& t = tuning().types.line;
+  const std::size_t most = tuning().types.line.compared;
   std::vector<NormalLine> out;
   for (const Bend& bend : bends) {
     const Vec3 from = bend.point - middle;
     const Flat n = plane.transpose() * bend.normal;
-    if (from.squaredNorm() > radius * radius || n.norm() < t.least_across) continue;
-    out.push_back({plane.transpose() * from, Flat(-n.y(), n.x()) / n.norm(), bend.area});
+    if (from.squaredNorm() > radius * radius || n.isZero()) continue;
+    out.push_back({plane.transpose() * from, Flat(-n.y(), n.x()) / n.norm(), bend.weight * n.squaredNorm()});
   }
   std::stable_sort(out.begin(), out.end(),
                    [](const NormalLine& x, const NormalLine& y) { return x.weight > y.weight; });
-  if (out.size() > t.compared) out.resize(t.compared);
+  if (out.size() > most) out.resize(most);
   return out;
 }
 
@@ -69,7 +70,7 @@ std::optional<Flat> crossing(const NormalLine& x, const NormalLine& y) {
   Eigen::Matrix2d rows;
   rows << x.across.transpose(), y.across.transpose();
   const double sine = rows.determinant();
-  if (std::abs(sine) < tuning().types.line.least_crossing) return std::nullopt;
+  if (sine == 0.0) return std::nullopt;
   return Flat(rows.inverse() * Flat(x.across.dot(x.point), y.across.dot(y.point)));
 }
 
@@ -99,25 +100,24 @@ std::vector<Bend> bends_of(const SurfaceMesh& surface, double crease_angle) {
     const Vec3 &m = normals[static_cast<std::size_t>(x.triangle)], &n = normals[static_cast<std::size_t>(y.triangle)];
     if (m.isZero() || n.isZero()) continue;
     const double bent = std::atan2(m.cross(n).norm(), m.dot(n));
-    if (bent < tuning().types.line.least_bend || bent > crease_angle) continue;
+    if (!(bent > 0.0) || bent > crease_angle) continue;
     out.push_back({0.5 * (surface.vertices[x.low] + surface.vertices[x.high]),
-                   (m.normalized() + n.normalized()).normalized(), m.norm() + n.norm()});
+                   (m.normalized() + n.normalized()).normalized(), bent * (m.norm() + n.norm())});
   }
   return out;
 }
 
 std::optional<Vec3> common_line(const std::vector<Bend>& a, const std::vector<Bend>& b, const Vec3& direction,
                                 const Vec3& middle, double radius) {
-  const CommonLineTuning& t = tuning().types.line;
   Eigen::Matrix<double, 3, 2> plane;
   plane.col(0) = direction.unitOrthogonal();
   plane.col(1) = direction.cross(plane.col(0));
   const std::array lines{lines_near(a, plane, middle, radius), lines_near(b, plane, middle, radius)};
-  const double off = t.off * radius;
+  const double off = tuning().types.line.off * radius;
   double most = 0.0;
   std::optional<Flat> found;  // the point from which the squares of distances to these lines are least
   for (const auto& some : lines)
-    for (std::size_t i = 0; i < std::min(some.size(), t.paired); ++i)
+    for (std::size_t i = 0; i < std::min(some.size(), tuning().types.line.paired); ++i)
       for (std::size_t j = 0; j < i; ++j) {
         const auto c = crossing(some[i], some[j]);
         if (!c) continue;

@@ -14,7 +14,7 @@ namespace limber::internal {
 /// into itself about a line all these normals meet that line: the mean of two alike facets does so exactly.
 struct Bend {
   Vec3 point, normal;
-  double area = 0.0;  ///< of the two triangles
+  double weight = 0.0;  ///< the angle times the area of the two triangles
 };
 
 /// @param crease_angle rad; sharper edges are no bends

@@ -2,20 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "limber/core/disjoint_sets.h"
 #include "tuning.h"
+#include "types/bridges.h"
 #include "types/other_hypotheses.h"
 
 namespace limber::internal {
 namespace {
 
-/// Whether nothing but this pair's contact leads from one of its parts to the other.
-bool is_bridge(const Assembly& assembly, const std::vector<PairOfParts>& pairs, const PairOfParts& bridge) {
-  DisjointSets groups(assembly.components.size());
-  for (const PairOfParts& pair : pairs)
-    if (&pair != &bridge) groups.join(pair.a(), pair.b());
-  return groups.root(bridge.a()) != groups.root(bridge.b());
+/// Flat contacts that alone lead from one of their parts to the other.
+std::vector<PairOfParts*> flat_bridges(const Assembly& assembly, std::vector<PairOfParts>& pairs) {
+  std::vector<std::pair<Index, Index>> edges;
+  for (const PairOfParts& pair : pairs) edges.emplace_back(pair.a(), pair.b());
+  const std::vector<bool> is_bridge = find_bridges(static_cast<Index>(assembly.components.size()), edges);
+  std::vector<PairOfParts*> out;
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    if (is_bridge[p] && pairs[p].is_flat()) out.push_back(&pairs[p]);
+  return out;
 }
 
 Vec3 normal_of(const PairOfParts& flat) { return flat.slippage.hypotheses.front().joint.frame.axes.col(2); }
@@ -23,13 +27,14 @@ Vec3 normal_of(const PairOfParts& flat) { return flat.slippage.hypotheses.front(
 }  // namespace
 
 void explain_flanges(const Assembly& assembly, std::vector<PairOfParts>& pairs) {
-  std::vector<PairOfParts*> flat;
-  for (PairOfParts& pair : pairs)
-    if (pair.is_flat() && is_bridge(assembly, pairs, pair)) flat.push_back(&pair);
-  const auto looks_another_way = [&](const PairOfParts* pair) {
-    return std::abs(normal_of(*pair).dot(normal_of(*flat.front()))) < tuning().types.line.one_way;
+  const std::vector<PairOfParts*> flat = flat_bridges(assembly, pairs);
+  const auto look_one_way = [](const PairOfParts* x, const PairOfParts* y) {
+    return std::abs(normal_of(*x).dot(normal_of(*y))) >= tuning().types.line.one_way;
   };
-  if (std::none_of(flat.begin(), flat.end(), looks_another_way)) return;
+  const auto looks_as_all = [&](const PairOfParts* x) {
+    return std::all_of(flat.begin(), flat.end(), [&](const PairOfParts* y) { return look_one_way(x, y); });
+  };
+  if (std::all_of(flat.begin(), flat.end(), looks_as_all)) return;
   for (PairOfParts* pair : flat) prefer_turn(pair->slippage);
 }
 
