@@ -192,7 +192,7 @@ struct Work {
   std::vector<DetectedJoint> joints;
   std::vector<bool> limits_kept;      ///< per joint: the kept file's limits stand
   std::vector<RangeOfMotion> ranges;  ///< per joint; empty with --no-limits
-  std::vector<JointCoupling> couplings;
+  std::vector<JointCoupling> couplings, chain_couplings;
 };
 
 Assembly take_apart(const Arguments& a, const Work& work) {
@@ -288,7 +288,7 @@ std::string kind_text(const JointSpec& joint) {
 }
 
 std::string coupling_text(const JointCoupling& c) {
-  if (!c.even) return fmt::format(", moved by joint {}", c.first.joint);
+  if (!c.even) return fmt::format(", moved by joint {} ({:.4g} as drawn)", c.first.joint, c.ratio);
   return fmt::format(", {} times joint {}", ratio_text(c), c.first.joint);
 }
 
@@ -296,8 +296,9 @@ std::string joint_text(const Work& work, std::size_t number, bool explain, bool 
   const DetectedJoint& j = work.joints[number];
   const auto name = [&](Index c) { return work.assembly.components[static_cast<std::size_t>(c)].name; };
   std::string range = limits ? limits_text(j.joint) : "";
-  for (const JointCoupling& c : work.couplings)
-    if (c.second.joint == number) range += coupling_text(c);
+  for (const auto* couplings : {&work.couplings, &work.chain_couplings})
+    for (const JointCoupling& c : *couplings)
+      if (c.second.joint == number) range += coupling_text(c);
   std::string text = fmt::format("{:>4}  {:<12} {:.2f}  \"{}\" - \"{}\"{}\n", number, to_string(j.joint.type),
                                  j.confidence, name(j.a), name(j.b), range.empty() ? "" : ": " + range);
   if (!explain) return text;
@@ -422,6 +423,7 @@ void find_joints(Program& program, const Arguments& a) {
       find_limits(a, program, jobs, work);
       return 0;
     });
+  work.chain_couplings = chain_couplings(work.assembly, work.joints);
   write_files(program, a, work);
 
   const Kinematics kinematics = overall_kinematics(work.assembly, work.joints, work.couplings);

@@ -1,12 +1,19 @@
-// Gears, a rack with its pinion, a cam with its follower: each keeps its freedom, as the other goes along.
+// Gears, a rack with its pinion, a cam with its follower, a slider crank: each keeps its freedom, as the
+// other goes along.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
 #include <numbers>
 #include <string>
 #include <vector>
 
+#include "assemblies.h"
 #include "constants.h"
+#include "joint_scores.h"
+#include "limber/articulation/detect_joints.h"
+#include "limber/jobs_tbb/tbb_jobs.h"
 #include "sample_assembly.h"
 
 namespace limber {
@@ -189,6 +196,36 @@ TEST(CoupledMotion, ACamTurnsFullyAndItsFollowerGoesAlong) {
   ASSERT_EQ(couplings.size(), 1u);
   EXPECT_FALSE(couplings[0].even);
   EXPECT_EQ(overall_kinematics(assembly, joints, couplings).mobility, 1);
+}
+
+/// As drawn: a throw of 0.03 at 50°, a rod of 0.12, a block with its bore, crank, rod and piston as files have them.
+TEST(CoupledMotion, ASliderCrankKeepsItsFreedomAndItsAxesGoAlong) {
+  TbbJobs jobs;
+  const Assembly assembly = assemblies::taken_apart(assemblies::make("piston", {.segments = 16, .clearance = 0.005}));
+  const std::vector<DetectedJoint> joints = detect_joints(assembly, {}, jobs);
+  ASSERT_EQ(joints.size(), 4u);
+  EXPECT_EQ(overall_kinematics(assembly, joints).mobility, 1);
+  const auto joint_between = [&](const std::string& a, const std::string& b) {
+    const auto name = [&](Index c) { return assembly.components[static_cast<std::size_t>(c)].name; };
+    return static_cast<std::size_t>(std::distance(
+        joints.begin(), std::ranges::find_if(joints, [&](const auto& j) { return name(j.a) == a && name(j.b) == b; })));
+  };
+  const std::size_t crank = joint_between("block", "crank"), slider = joint_between("block", "piston");
+  ASSERT_LT(std::max(crank, slider), joints.size());
+  const std::vector<RangeOfMotion> ranges = ranges_of_motion(assembly, joints, {}, jobs);
+  EXPECT_TRUE(ranges[crank].joint.limits.rotation.open());
+  EXPECT_TRUE(ranges[slider].joint.limits.translation[0].open());
+  const std::vector<JointCoupling> couplings = chain_couplings(assembly, joints);
+  ASSERT_EQ(couplings.size(), 3u);  // all but the piston's turn in its bore, which the wrist pin holds
+  const auto of_slider =
+      std::ranges::find_if(couplings, [&](const JointCoupling& c) { return c.second.joint == slider; });
+  ASSERT_NE(of_slider, couplings.end());
+  EXPECT_EQ(of_slider->first.joint, crank);
+  EXPECT_FALSE(of_slider->second.turns);
+  constexpr double kThrow = 0.03, kRod = 0.12, kAngle = 50.0 * kPi / 180.0;
+  const double aside = kThrow * std::sin(kAngle), along = kThrow * std::cos(kAngle);
+  const double speed = aside * (1.0 + along / std::sqrt(kRod * kRod - aside * aside));
+  EXPECT_NEAR(std::abs(of_slider->ratio), speed, 1e-3 * speed);
 }
 
 TEST(CoupledMotion, WedgesThatStopEachOtherOnOneSideAreNot) {

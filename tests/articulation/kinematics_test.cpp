@@ -48,6 +48,26 @@ TEST(Kinematics, FourBarLinkagesMoveOneByOneHoweverMany) {
   }
 }
 
+/// Speeds of a four-bar linkage's angles by the closed chain of its three vectors: Σ lᵢ ωᵢ n × eᵢ = 0.
+TEST(Kinematics, AFourBarLinkagesAxesGoAlongWithItsCrank) {
+  const FourBars bars(2);
+  const std::vector<JointCoupling> couplings = chain_couplings(bars.assembly, bars.joints);
+  ASSERT_EQ(couplings.size(), 6u);  // of each linkage three, with its crank
+  Eigen::Matrix2d across;
+  across << -0.3, 0.0, 1.5, 0.0;  // of the coupler (1.5, 0.3), then of the rocker (−0.3, 1.3), turned by a right angle
+  across.col(1) = -Eigen::Vector2d(-1.3, -0.3);
+  const Eigen::Vector2d turns = across.inverse() * -Eigen::Vector2d(-1.0, 0.2);
+  const double expected[3] = {turns[0] - 1.0, turns[1] - turns[0], turns[1]};
+  for (std::size_t i = 0; i < couplings.size(); ++i) {
+    const JointCoupling& c = couplings[i];
+    EXPECT_EQ(c.first.joint, 4 * (i / 3));
+    EXPECT_EQ(c.second.joint, 4 * (i / 3) + 1 + i % 3);
+    EXPECT_TRUE(c.first.turns && c.second.turns);
+    EXPECT_FALSE(c.even);
+    EXPECT_NEAR(c.ratio, expected[i % 3], 1e-9);
+  }
+}
+
 // Gears in a row turn together; in a ring they do if their number is even.
 TEST(Kinematics, GearsInARingTurnIfTheirNumberIsEven) {
   for (const std::size_t gears : {3u, 4u, 5u, 6u}) {

@@ -1,6 +1,9 @@
 #include <Eigen/QR>
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <span>
 #include <string>
 #include <utility>
@@ -10,6 +13,7 @@
 #include "limber/core/disjoint_sets.h"
 #include "limber/core/error.h"
 #include "tuning.h"
+#include "types/bridges.h"
 #include "types/couplings.h"
 
 namespace limber {
@@ -37,6 +41,20 @@ Row shift_row(const Vec3& axis, const JointSpec& joint, const OwnMotion& own) {
   Row row;
   row << ((joint.frame.origin - own.centre) / own.length).cross(axis), axis;
   return row;
+}
+
+/// Centres are the means of the origins of a component's joints.
+std::vector<OwnMotion> own_motions(const Assembly& assembly, const std::vector<DetectedJoint>& joints) {
+  std::vector<OwnMotion> out(assembly.components.size());
+  std::vector<double> joints_at(out.size(), 0.0);
+  for (std::size_t c = 0; c < out.size(); ++c)
+    if (assembly.components[c].diagonal > 0.0) out[c].length = assembly.components[c].diagonal;
+  for (const DetectedJoint& j : joints)
+    for (const Index part : {j.a, j.b}) {
+      const auto c = static_cast<std::size_t>(part);
+      out[c].centre += (j.joint.frame.origin - out[c].centre) / ++joints_at[c];
+    }
+  return out;
 }
 
 /// The rows that a joint gives to the motion of one of its components: r_b·ξ_b = r_a·ξ_a for what the joint holds.
@@ -98,15 +116,8 @@ class ConstraintRank {
  public:
   ConstraintRank(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
                  std::span<const JointCoupling> couplings)
-      : joints_(joints), couplings_(couplings), sets_(assembly.components.size()), own_(assembly.components.size()) {
-    std::vector<double> joints_at(own_.size(), 0.0);
-    for (std::size_t c = 0; c < own_.size(); ++c)
-      if (assembly.components[c].diagonal > 0.0) own_[c].length = assembly.components[c].diagonal;
-    for (const DetectedJoint& j : joints) {
-      sets_.join(j.a, j.b);
-      for (const Index c : {j.a, j.b})
-        own(c).centre += (j.joint.frame.origin - own(c).centre) / ++joints_at[static_cast<std::size_t>(c)];  // a mean
-    }
+      : joints_(joints), couplings_(couplings), sets_(assembly.components.size()), own_(own_motions(assembly, joints)) {
+    for (const DetectedJoint& j : joints) sets_.join(j.a, j.b);
     for (const JointCoupling& c : couplings) sets_.join(joints[c.first.joint].a, joints[c.second.joint].a);
     std::vector<Index> columns(own_.size(), 0);
     for (std::size_t c = 0; c < own_.size(); ++c) column_.push_back(6 * columns[root(static_cast<Index>(c))]++);
@@ -181,7 +192,136 @@ class ConstraintRank {
   std::vector<SetOfRows> sets_of_rows_;  ///< at the root of each set
 };
 
+/// Joints that closed chains hold besides, those of chains that share parts together.
+std::vector<std::vector<std::size_t>> closed_chains(Index components, const std::vector<DetectedJoint>& joints) {
+  std::vector<std::pair<Index, Index>> edges;
+  for (const DetectedJoint& j : joints) edges.emplace_back(j.a, j.b);
+  const std::vector<bool> is_bridge = internal::find_bridges(components, edges);
+  DisjointSets sets(static_cast<std::size_t>(components));
+  for (std::size_t j = 0; j < joints.size(); ++j)
+    if (!is_bridge[j]) sets.join(joints[j].a, joints[j].b);
+  std::map<Index, std::vector<std::size_t>> chains;
+  for (std::size_t j = 0; j < joints.size(); ++j)
+    if (!is_bridge[j]) chains[sets.root(joints[j].a)].push_back(j);
+  std::vector<std::vector<std::size_t>> out;
+  for (auto& [root, chain] : chains) out.push_back(std::move(chain));
+  return out;
+}
+
+/// A basis, in columns.
+Eigen::MatrixXd null_space(Eigen::MatrixXd A) {
+  Eigen::VectorXd scale = A.colwise().norm();
+  for (double& s : scale) s = s > 0.0 ? 1.0 / s : 1.0;
+  A = A * scale.asDiagonal();
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  qr.setThreshold(internal::tuning().types.frames.independent);
+  qr.compute(A);
+  const Eigen::Index rank = qr.rank(), free = A.cols() - rank;
+  Eigen::MatrixXd basis(A.cols(), free);
+  basis.topRows(rank) = -qr.matrixR()
+                             .topLeftCorner(rank, rank)
+                             .triangularView<Eigen::Upper>()
+                             .solve(qr.matrixR().topRightCorner(rank, free));
+  basis.bottomRows(free).setIdentity();
+  return scale.asDiagonal() * (qr.colsPermutation() * basis);
+}
+
+/// The motions of the parts of closed chains.
+class ChainMotions {
+ public:
+  ChainMotions(const std::vector<DetectedJoint>& joints, const std::vector<OwnMotion>& own,
+               const std::vector<std::size_t>& chain)
+      : joints_(joints), own_(own), chain_(chain) {
+    for (const std::size_t j : chain)
+      for (const Index part : {joints[j].a, joints[j].b}) column_.try_emplace(part, 6 * std::ssize(column_));
+  }
+
+  std::vector<JointCoupling> couplings() {
+    if (6 * column_.size() > internal::tuning().types.frames.dense_columns) return {};
+    motions_ = null_space(constraints());
+    std::vector<std::pair<JointAxis, Eigen::RowVectorXd>> axes;
+    double fastest = 0.0;
+    for (const std::size_t j : chain_)
+      for (const bool turns : {true, false})
+        if (has_axis(joints_[j].joint, turns)) {
+          axes.emplace_back(JointAxis{j, turns}, speeds({j, turns}));
+          fastest = std::max(fastest, axes.back().second.norm() * unit({j, turns}));
+        }
+    const double least = internal::tuning().types.frames.independent;
+    std::erase_if(axes, [&](const auto& axis) { return axis.second.norm() * unit(axis.first) <= least * fastest; });
+    return along_with_each_other(axes);
+  }
+
+ private:
+  const OwnMotion& own(Index part) const { return own_[static_cast<std::size_t>(part)]; }
+
+  /// A length, by which turns are compared with slides.
+  double unit(const JointAxis& axis) const {
+    const DetectedJoint& j = joints_[axis.joint];
+    return axis.turns ? std::sqrt(own(j.a).length * own(j.b).length) : 1.0;
+  }
+
+  Eigen::MatrixXd constraints() const {
+    std::vector<Eigen::RowVectorXd> rows;
+    for (const std::size_t at : chain_) {
+      const DetectedJoint& j = joints_[at];
+      const double row_length = unit({at, true});
+      const Rows of_a = held_motions(j.joint, own(j.a), row_length), of_b = held_motions(j.joint, own(j.b), row_length);
+      for (Eigen::Index r = 0; r < of_b.rows(); ++r) {
+        rows.emplace_back(Eigen::RowVectorXd::Zero(6 * std::ssize(column_)));
+        rows.back().segment<6>(column_.at(j.b)) += of_b.row(r);
+        rows.back().segment<6>(column_.at(j.a)) -= of_a.row(r);
+      }
+    }
+    Eigen::MatrixXd out(std::ssize(rows), 6 * std::ssize(column_));
+    for (std::size_t r = 0; r < rows.size(); ++r) out.row(static_cast<Eigen::Index>(r)) = rows[r];
+    return out;
+  }
+
+  /// Of an axis in each motion.
+  Eigen::RowVectorXd speeds(const JointAxis& axis) const {
+    const DetectedJoint& j = joints_[axis.joint];
+    return axis_row(j.joint, axis.turns, own(j.b)).transpose() * motions_.middleRows<6>(column_.at(j.b)) -
+           axis_row(j.joint, axis.turns, own(j.a)).transpose() * motions_.middleRows<6>(column_.at(j.a));
+  }
+
+  /// Axes whose speeds are the same but for a factor in all motions.
+  static std::vector<JointCoupling> along_with_each_other(
+      const std::vector<std::pair<JointAxis, Eigen::RowVectorXd>>& axes) {
+    const double same = internal::tuning().types.frames.independent;
+    std::vector<JointCoupling> out;
+    std::vector<std::size_t> leaders;
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      const auto ratio = [&](std::size_t leader) {
+        return axes[i].second.dot(axes[leader].second) / axes[leader].second.squaredNorm();
+      };
+      const auto leader = std::find_if(leaders.begin(), leaders.end(), [&](std::size_t l) {
+        return (axes[i].second - ratio(l) * axes[l].second).norm() <= same * axes[i].second.norm();
+      });
+      if (leader == leaders.end())
+        leaders.push_back(i);
+      else
+        out.push_back({axes[*leader].first, axes[i].first, ratio(*leader), false});
+    }
+    return out;
+  }
+
+  const std::vector<DetectedJoint>& joints_;
+  const std::vector<OwnMotion>& own_;
+  const std::vector<std::size_t>& chain_;
+  std::map<Index, Eigen::Index> column_;  ///< per part
+  Eigen::MatrixXd motions_;               ///< in columns
+};
+
 }  // namespace
+
+std::vector<JointCoupling> chain_couplings(const Assembly& assembly, const std::vector<DetectedJoint>& joints) {
+  const std::vector<OwnMotion> own = own_motions(assembly, joints);
+  std::vector<JointCoupling> out;
+  for (const auto& chain : closed_chains(static_cast<Index>(assembly.components.size()), joints))
+    for (const JointCoupling& c : ChainMotions(joints, own, chain).couplings()) out.push_back(c);
+  return out;
+}
 
 bool has_axis(const JointSpec& joint, bool turns) {
   const bool cylindrical = joint.type == JointType::kCylindrical;

@@ -94,6 +94,11 @@ struct Kinematics {
 Kinematics overall_kinematics(const Assembly& assembly, const std::vector<DetectedJoint>& joints,
                               std::span<const JointCoupling> couplings = {});
 
+/// Axes in closed chains that go along with each other, as a crank's with its slider's: each with the first of its
+/// chain that moves, and the ratio of their speeds as read, which changes on the way (`even` is false). An axis that
+/// the chain holds is in none. Chains of more than 200 parts are left out.
+std::vector<JointCoupling> chain_couplings(const Assembly& assembly, const std::vector<DetectedJoint>& joints);
+
 /// Whether the joint turns about x, or slides along it, by a coordinate of its own; a screw turns.
 bool has_axis(const JointSpec& joint, bool turns);
 
