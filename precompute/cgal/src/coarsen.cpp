@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -39,6 +38,7 @@ struct Quadric {
 
 using Face = std::array<Index, 3>;
 using Pair = std::array<Index, 2>;
+using ShortEdge = std::tuple<double, Index, Index>;  ///< length, nodes
 
 /// Surroundings of a node or an edge: nodes and pairs of them, ascending, each once.
 struct Link {
@@ -62,7 +62,8 @@ class Collapser {
         origin_(mesh.nodes[static_cast<std::size_t>(mesh.tets[0][0])]),
         tets_at_(mesh.nodes.size()),
         quadric_(mesh.nodes.size()),
-        alive_(mesh.tets.size(), 1) {
+        alive_(mesh.tets.size(), 1),
+        changed_(mesh.nodes.size(), 1) {
     for (std::size_t t = 0; t < mesh.tets.size(); ++t)
       for (const Index n : mesh.tets[t]) tets_at_[n].push_back(static_cast<Index>(t));
     for (std::size_t n = 0; n < mesh.nodes.size(); ++n)
@@ -90,7 +91,8 @@ class Collapser {
   /// Boundary triangles around a node, that node first, seen from outside.
   std::vector<Face> boundary_faces(Index node) const {
     constexpr int kOutward[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-    std::map<Face, std::pair<int, Face>> faces;  // by sorted nodes
+    std::vector<std::pair<Face, Face>> faces;  // its nodes in order, and as seen from outside
+    faces.reserve(3 * tets_at_[node].size());
     for (const Index t : tets_at_[node])
       for (const auto& f : kOutward) {
         const Tet& tet = mesh_.tets[t];
@@ -100,21 +102,25 @@ class Collapser {
         std::rotate(outward.begin(), at, outward.end());
         Face key = outward;
         std::sort(key.begin(), key.end());
-        auto& [count, face] = faces[key];
-        ++count, face = outward;
+        faces.emplace_back(key, outward);
       }
+    std::sort(faces.begin(), faces.end());
     std::vector<Face> boundary;
-    for (const auto& [key, counted] : faces)
-      if (counted.first == 1) boundary.push_back(counted.second);
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      const bool as_before = i > 0 && faces[i - 1].first == faces[i].first;
+      const bool as_after = i + 1 < faces.size() && faces[i + 1].first == faces[i].first;
+      if (!as_before && !as_after) boundary.push_back(faces[i].second);
+    }
     return boundary;
   }
 
   Link link_of(Index node, const std::vector<Face>& boundary) const {
     Link link;
     for (const Index t : tets_at_[node]) {
-      std::vector<Index> others;
+      Face others{};
+      std::size_t count = 0;
       for (const Index n : mesh_.tets[t])
-        if (n != node) others.push_back(n);
+        if (n != node) others[count++] = n;
       link.nodes.insert(link.nodes.end(), others.begin(), others.end());
       for (std::size_t i = 0; i < 3; ++i) link.pairs.push_back({others[i], others[(i + 1) % 3]});
     }
@@ -178,18 +184,29 @@ class Collapser {
     return !both.empty();
   }
 
-  /// The tets that a move of `gone` onto `stays` leaves behind are sound, and no edge of them is too long.
+  /// The tets that a move of `gone` onto `stays` leaves behind are sound.
   bool leaves_sound_tets(Index gone, Index stays) const {
-    for (const Index t : tets_at_[gone]) {
+    return std::all_of(tets_at_[gone].begin(), tets_at_[gone].end(), [&](Index t) {
       Tet moved = mesh_.tets[t];
-      if (std::find(moved.begin(), moved.end(), stays) != moved.end()) continue;
+      if (std::find(moved.begin(), moved.end(), stays) != moved.end()) return true;
       std::replace(moved.begin(), moved.end(), gone, stays);
       const double after = shape(mesh_, moved);
-      if (!(after > 0.0) || after < std::min(options_.least_shape, shape(mesh_, mesh_.tets[t]))) return false;
-      for (const Index n : moved)
-        if (n != stays && length(n, stays) > options_.longest(middle(n, stays))) return false;
+      return after > 0.0 && after >= std::min(options_.least_shape, shape(mesh_, mesh_.tets[t]));
+    });
+  }
+
+  /// No edge that a move of `gone` onto `stays` makes is too long.
+  bool leaves_short_edges(Index gone, Index stays) const {
+    std::vector<Index> neighbours;
+    for (const Index t : tets_at_[gone]) {
+      const Tet& tet = mesh_.tets[t];
+      if (std::find(tet.begin(), tet.end(), stays) == tet.end())
+        neighbours.insert(neighbours.end(), tet.begin(), tet.end());
     }
-    return true;
+    std::sort(neighbours.begin(), neighbours.end());
+    neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
+    return std::all_of(neighbours.begin(), neighbours.end(),
+                       [&](Index n) { return n == gone || length(n, stays) <= options_.longest(middle(n, stays)); });
   }
 
   bool collapse(Index gone, Index stays) {
@@ -199,9 +216,12 @@ class Collapser {
       const double bound = options_.deviation(mesh_.nodes[stays]);
       if (at_stays.empty() || quadric_[gone].mean_square_at(place(stays)) > bound * bound) return false;
     }
-    if (!leaves_sound_tets(gone, stays) || !link_condition(gone, stays, at_gone, at_stays)) return false;
+    if (!leaves_sound_tets(gone, stays) || !link_condition(gone, stays, at_gone, at_stays) ||
+        !leaves_short_edges(gone, stays))
+      return false;
     for (const Index t : tets_at_[gone]) {
       Tet& tet = mesh_.tets[t];
+      for (const Index n : tet) changed_[n] = 1;
       if (std::find(tet.begin(), tet.end(), stays) != tet.end()) {
         alive_[t] = 0;
         for (const Index n : tet)
@@ -216,19 +236,32 @@ class Collapser {
     return true;
   }
 
-  bool pass() {
-    std::vector<std::tuple<double, Index, Index>> edges;
+  /// Brings the list of edges that are too short up to date with what the last pass has changed.
+  void list_short_edges() {
+    const auto is_stale = [&](Index a, Index b) { return changed_[a] || changed_[b]; };
+    std::erase_if(short_edges_, [&](const ShortEdge& e) { return is_stale(std::get<1>(e), std::get<2>(e)); });
+    std::vector<Pair> edges;
     for (std::size_t t = 0; t < alive_.size(); ++t) {
       if (!alive_[t]) continue;
       for (const auto& [i, j] : kTetEdges) {
         const auto [a, b] = std::minmax(mesh_.tets[t][i], mesh_.tets[t][j]);
-        if (const double l = length(a, b); l < options_.shortest(middle(a, b))) edges.emplace_back(l, a, b);
+        if (is_stale(a, b)) edges.push_back({a, b});
       }
     }
     std::sort(edges.begin(), edges.end());
     edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    for (const auto& [a, b] : edges)
+      if (const double l = length(a, b); l < options_.shortest(middle(a, b))) short_edges_.emplace_back(l, a, b);
+    std::sort(short_edges_.begin(), short_edges_.end());
+  }
+
+  /// An edge that could not go can only if what is around its nodes has changed since.
+  bool pass() {
+    list_short_edges();
+    const std::vector<char> changed_before = std::exchange(changed_, std::vector<char>(changed_.size(), 0));
     bool any = false;
-    for (const auto& [l, a, b] : edges) {
+    for (const auto& [l, a, b] : short_edges_) {
+      if (!(changed_before[a] || changed_before[b] || changed_[a] || changed_[b])) continue;
       // An edge may have gone with another; one that was made since is the next pass's.
       if (!are_neighbours(a, b)) continue;
       any = collapse(b, a) || collapse(a, b) || any;
@@ -248,6 +281,8 @@ class Collapser {
   std::vector<std::vector<Index>> tets_at_;
   std::vector<Quadric> quadric_;
   std::vector<char> alive_;
+  std::vector<char> changed_;  ///< per node: the tets around it, in this pass
+  std::vector<ShortEdge> short_edges_;
 };
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace {
 // docs/tetrahedralisation.md has the measurements behind these.
 constexpr double kLeastCellsPerBody = 8.0;  ///< a body smaller than this many cells gets smaller ones
 constexpr double kSamplesPerCell = 2.0;     ///< along a side
-constexpr double kFacetDistancePerCell = 0.1, kFacetDistancePerWideCell = 0.05;
+constexpr double kFacetDistancePerCell = 0.1, kFacetDistancePerWideCell = kFacetDistancePerCell / kNodesOfWideCells;
 /// Refinement that makes this many times the nodes expected is running away.
 constexpr double kRunaway = 2.5;
 constexpr std::size_t kFewNodes = 2000;               ///< are never too many
@@ -117,8 +117,7 @@ Judged make(const MeasuredBody& body, double smallest_cell, const Attempt& how) 
   std::vector<ThicknessSample> samples = body.samples;
   for (ThicknessSample& s : samples) s.thickness *= how.fineness;
   const double expected = expected_nodes(samples, body.body->volume, largest, least);
-  // Half the distance to a curved side asks for twice as many nodes on it.
-  const double runaway = kRunaway * (how.wide_cells ? kFacetDistancePerCell / kFacetDistancePerWideCell : 1.0);
+  const double runaway = kRunaway * (how.wide_cells ? kNodesOfWideCells : 1.0);
   Judged j = judge(mesh_body(body.body->boundary, body.body->inner, body.body->seeds,
                              {.cell_size = size,
                               .facet_distance = how.wide_cells ? kFacetDistancePerWideCell : kFacetDistancePerCell,

@@ -9,6 +9,10 @@
 
 namespace limber::internal {
 
+/// Times the nodes expected that a mesh for wide cells may take, and does where all sides are curved: half the distance
+/// to a curved side asks for twice as many on it.
+inline constexpr double kNodesOfWideCells = 2.0;
+
 /// A body, the size of its cells and what it has of thin parts.
 struct MeasuredBody {
   const Body* body = nullptr;
@@ -38,6 +42,8 @@ struct FilledBody {
 struct Filling {
   bool keep_sharp_edges = false;
   bool wide_cells = false;  ///< where a body without inner surfaces is thin, wider than it is thick: for ten-node tets
+  /// A wrap, whose edges are not kept, is curved all over.
+  double nodes_per_expected() const { return wide_cells && !keep_sharp_edges ? kNodesOfWideCells : 1.0; }
 };
 
 /// The first good mesh, or else the best; if that is less than half of the body's volume, none. Good is: without flat

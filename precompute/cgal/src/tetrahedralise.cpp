@@ -215,7 +215,7 @@ void add_body(const MeasuredBody& body, const std::string& which, const internal
   result.sharp_edges_kept = result.sharp_edges_kept && filled.sharp_edges_kept;
   const std::string sized = "tetrahedralise: " + which + " (diagonal " + text(body.body->diagonal) + " m, cells of " +
                             text(body.cell_size) + " m, " + text(result.smallest_cell) + " m where it is thin): ";
-  const std::string way_out = "; its thin parts ask for " + text(body.nodes_to_resolve()) +
+  const std::string way_out = "; its thin parts ask for " + text(how.nodes_per_expected() * body.nodes_to_resolve()) +
                               " nodes in all: try max_nodes (--max-nodes) above that, or another cell size";
   if (filled.mesh.tets.empty())
     throw ComputationError(sized + filled.fault + " in the best of " + std::to_string(filled.tries) +
@@ -235,14 +235,15 @@ void fill_bodies(const Bodies& bodies, double cell_size, const Tetrahedralisatio
   std::vector<MeasuredBody> measured;
   for (const Body& body : bodies.bodies) measured.push_back(internal::measure(body, cell_size));
   refuse_huge_mesh(measured, cell_size);
-  result.smallest_cell = internal::smallest_affordable_cell(measured, options.max_nodes);
+  const internal::Filling how{.keep_sharp_edges = !result.wrapped, .wide_cells = options.quadratic};
+  result.smallest_cell = internal::smallest_affordable_cell(measured, options.max_nodes / how.nodes_per_expected());
   result.seconds_thickness = seconds_since(start);
 
   start = std::chrono::steady_clock::now();
   result.sharp_edges_kept = !result.wrapped;
   for (std::size_t b = 0; b < measured.size(); ++b) {
     tell(options, "meshing body " + std::to_string(b + 1) + " of " + std::to_string(measured.size()));
-    add_body(measured[b], "body " + std::to_string(b), {!result.wrapped, options.quadratic}, result, warnings);
+    add_body(measured[b], "body " + std::to_string(b), how, result, warnings);
     result.volume_before += bodies.bodies[b].volume;
   }
   result.seconds_mesh = seconds_since(start);
