@@ -50,9 +50,13 @@ export declare class Posing {
   letGo(): void;
   removeHandles(): void;
 
+  /** A name that no other part has, and jointsText() tells. */
+  setName(part: number, name: string): void;
   setPinned(part: number, pinned: boolean): void;
   setSoft(part: number, soft: boolean): void;
   setJoint(joint: number, told: JointType): void;
+  /** Cuts the part that the last cast() met in two, on a ball. @param from, to directions from the eye to the ends of a line across it */
+  cut(eye: Point, from: Point, to: Point): void;
   /** False where there is nothing to take back. */
   undo(): boolean;
   reset(): void;

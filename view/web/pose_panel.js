@@ -74,7 +74,7 @@ export class PosePanel {
       line.textContent = [...frames.slice(9 * j + 6, 9 * j + 6 + count)]
         .map((x, i) => (turns && i === 0 ? `${((180 / Math.PI) * x).toFixed(1)}°` : x.toPrecision(3))).join(', ');
     });
-    this.state.textContent = result && `${handles} points held, off by ${result.handleError.toPrecision(2)} at most; ${result.status}, ` +
+    this.state.textContent = result && `Held: ${handles}, off by ${result.handleError.toPrecision(2)} at most; ${result.status}, ` +
       `joints to ${result.jointError.toExponential(0)}`;
   }
 }
