@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "limber/core/error.h"
 #include "limber/posing/posed_model.h"
 #include "posed_models.h"
@@ -47,6 +49,27 @@ TEST_F(Lamp, APartThatBecomesSoftKeepsItsPlaceAndBackAgain) {
   EXPECT_LT(session_.solve().energy, 1e-16);
   session_.set_part(part("arm 1"), {});
   EXPECT_LT(largest_distance(before, vertices_of(session_)), 1e-6 * size_);
+}
+
+TEST_F(Lamp, AModelWithOtherNamesKeepsItsPose) {
+  drag({0.03, 0.05, -0.06});
+  const auto before = vertices_of(session_);
+  JointedModel model = session_.model();
+  std::vector<Index> was(model.parts.size());
+  std::iota(was.begin(), was.end(), Index{0});
+  model.parts[static_cast<std::size_t>(part("shade"))].name = "hood";
+  session_.set_model(model, was);
+  EXPECT_LT(largest_distance(before, vertices_of(session_)), 1e-14 * size_);
+  EXPECT_TRUE(session_.pinned(part("base")) && session_.contains(handle_));
+  EXPECT_EQ(session_.solve().status, PoseResult::Status::kConverged);
+  EXPECT_LT(largest_distance(before, vertices_of(session_)), 1e-6 * size_);
+  EXPECT_THROW(session_.set_model(model, std::span(was).first(1)), InvalidArgument);
+  was.back() = 99;
+  EXPECT_THROW(session_.set_model(model, was), InvalidArgument);
+  model.parts.front().name = "hood";
+  EXPECT_THROW(session_.set_model(model, was), InvalidArgument);
+  EXPECT_TRUE(session_.undo());
+  EXPECT_NO_THROW(part("shade"));
 }
 
 TEST_F(Lamp, AJointThatBecomesFixedTurnsNoMore) {
