@@ -54,8 +54,8 @@ struct BundleContact {
   Block8 now;                                            // the gap at the substep's start
   Block8 gap, slip[2], target;                           // what the rows' own numbers are added to; wanted gap
   Block8 force[3], before;                               // the latter: along the normal in the last substep
-  Block8 push, part;         // what displaces frames; how far they are to part in the substep, m
-  Block8 sum[3];             // of the substeps' forces, N
+  Block8 push, part;                                     // what displaces frames; the overlap beyond the slop, m
+  Block8 sum[3];                                         // of the substeps' forces, N
   Block8 radius, moment[3];  // resistance to rolling and spinning: a moment up to radius × normal force, N·m
   Block8 rebound;            // e² of a contact between rigid bodies
   Block8 fall;               // what free motion adds to the gap in a substep, m
@@ -97,16 +97,16 @@ void make_mode_rows(const ModePoint* const* points, std::int32_t modes, Block8* 
 void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes);
 /// Gaps at the substep's start, and what their rows are to add up to; whether any is to be pushed apart is told to each
 /// bundle. @param frames with one that stands at their end. @param shapes the modes at the substep's start, with a
-/// block of zeros at their end. @param share of an overlap beyond the slop that is undone in the substep. @param most m
-void measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
-                     float most);
+/// block of zeros at their end
+void measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes);
 /// One sweep of Gauss–Seidel: each contact's normal, then both tangents by one step. A forward one takes the normals of
 /// a pair backward first, and tells bundles what their forces do; a backward one adds them up. @param motion
 /// coordinates at the substep's end, as found so far, with a block of zeros at their end
 void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion);
-/// One sweep over displacements of the frames alone that part what overlaps. @param pushes by frame, with a block of
-/// zeros at their end
-void push_bundles(const BundleArrays& bundles, bool backward, Block8* pushes);
+/// One sweep over displacements of the frames alone that part what overlaps: an implicit Euler step of the flow down
+/// ½ Σ k (overlap − slop)², whose k undoes a `share` of one overlap alone. So pushes against each other come to rest.
+/// @param most by one contact, m. @param pushes by frame, with a block of zeros at their end
+void push_bundles(const BundleArrays& bundles, bool backward, float share, float most, Block8* pushes);
 /// Tells each bundle its residual.
 void find_residuals(const BundleArrays& bundles, const Block8* motion);
 /// motion += rows · force, of all contacts: what they begin the step with.

@@ -170,8 +170,8 @@ HWY_INLINE HWY_ATTR void AddCarried(const BundleArrays& all, const PairBundle& b
 }
 
 /// @param bent what the modes give to the rows' numbers
-HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12], const Vector* bent, float share,
-                                    float most, std::size_t lane) {
+HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12], const Vector* bent,
+                                    std::size_t lane) {
   const Lanes d;
   const Vector zero = hn::Zero(d);
   Vector apart[3];
@@ -179,7 +179,7 @@ HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12]
   const Vector straight = AddDot(c.axes[0], apart, Get(c.rest, lane), lane), force = Get(c.force[0], lane);
   const Vector now = hn::Add(straight, bent[0]);
   const Vector yields = hn::Mul(Get(c.compliance, lane), force), gap = hn::Add(now, yields);
-  const Vector part = hn::Min(hn::Mul(hn::Set(d, share), hn::Neg(hn::Add(gap, Get(c.slop, lane)))), hn::Set(d, most));
+  const Vector part = hn::Neg(hn::Add(gap, Get(c.slop, lane)));
   Put(now, c.now, lane);
   Put(straight, c.gap, lane);
   for (std::size_t t = 0; t < 2; ++t) Put(hn::Sub(Get(c.running[t], lane), bent[1 + t]), c.slip[t], lane);
@@ -190,8 +190,7 @@ HWY_INLINE HWY_ATTR bool MeasureOne(BundleContact& c, const Vector (*frames)[12]
   return !hn::AllTrue(d, hn::Le(part, zero));
 }
 
-HWY_ATTR void MeasureBundles(const BundleArrays& all, const FrameShift* frames, const Block8* shapes, float share,
-                             float most) {
+HWY_ATTR void MeasureBundles(const BundleArrays& all, const FrameShift* frames, const Block8* shapes) {
   const Lanes d;
   for (std::size_t b = 0; b < all.count; ++b) {
     PairBundle& bundle = all.bundles[b];
@@ -204,7 +203,7 @@ HWY_ATTR void MeasureBundles(const BundleArrays& all, const FrameShift* frames, 
       for (std::int32_t k = 0; k < bundle.count; ++k) {
         Vector bent[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
         AddModes(bundle, RowsOf(all, bundle, k), 3, modes, lane, bent);
-        if (MeasureOne(all.contacts[bundle.first + k], come, bent, share, most, lane)) bundle.overlaps = true;
+        if (MeasureOne(all.contacts[bundle.first + k], come, bent, lane)) bundle.overlaps = true;
       }
       if (bundle.carried) AddCarried(all, bundle, frames, lane);
     }
@@ -229,9 +228,8 @@ void make_bundle_rows(const BundleArrays& bundles, const Block8* shapes) {
   HWY_DYNAMIC_DISPATCH(MakeBundleRows)(bundles, shapes);
 }
 
-void measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes, float share,
-                     float most) {
-  HWY_DYNAMIC_DISPATCH(MeasureBundles)(bundles, frames, shapes, share, most);
+void measure_bundles(const BundleArrays& bundles, const FrameShift* frames, const Block8* shapes) {
+  HWY_DYNAMIC_DISPATCH(MeasureBundles)(bundles, frames, shapes);
 }
 
 }  // namespace limber::internal

@@ -169,23 +169,24 @@ HWY_ATTR void SweepBundles(const BundleArrays& all, bool backward, Block8* motio
   }
 }
 
-HWY_INLINE HWY_ATTR void PushOne(BundleContact& c, Sides& sides, std::size_t lane) {
-  const Lanes d;
-  const Vector zero = hn::Zero(d), part = Get(c.part, lane), before = Get(c.push, lane);
-  const Vector open = hn::Sub(part, ReadAxis(c, 0, sides, lane));
-  const Vector push = hn::Max(zero, hn::MulAdd(open, Get(c.inverse_push, lane), before));
-  const Vector change = hn::IfThenElseZero(hn::Gt(part, zero), hn::Sub(push, before));
-  Put(hn::Add(before, change), c.push, lane);
+HWY_INLINE HWY_ATTR void PushOne(BundleContact& c, Vector share, Vector most, Sides& sides, std::size_t lane) {
+  const Vector before = Get(c.push, lane), mass = Get(c.inverse_push, lane), parted = ReadAxis(c, 0, sides, lane);
+  const Vector wanted = hn::Mul(share, hn::MulAdd(mass, hn::Sub(Get(c.part, lane), parted), before));
+  const Vector push = hn::Max(hn::Zero(Lanes()), hn::Min(wanted, hn::MulAdd(mass, hn::Sub(most, parted), before)));
+  const Vector change = hn::Sub(push, before);
+  Put(push, c.push, lane);
   MoveSides(c, 1, &change, sides, lane);
 }
 
-HWY_ATTR void PushBundles(const BundleArrays& all, bool backward, Block8* pushes) {
+HWY_ATTR void PushBundles(const BundleArrays& all, bool backward, float share, float most, Block8* pushes) {
+  const Vector part = hn::Set(Lanes(), share), limit = hn::Set(Lanes(), most);
   for (std::size_t i = 0; i < all.count; ++i) {
     const PairBundle& bundle = all.bundles[backward ? all.count - 1 - i : i];
-    for (std::size_t lane = 0; lane < kBundleLanes && bundle.overlaps; lane += kLanesAtOnce) {
+    for (std::size_t lane = 0; lane < kBundleLanes; lane += kLanesAtOnce) {
       Sides sides;
       ReadSides(bundle, bundle.frame, pushes, lane, sides);
-      const auto push = [&](std::int32_t k) HWY_ATTR { PushOne(all.contacts[bundle.first + k], sides, lane); };
+      const auto push = [&](std::int32_t k)
+                            HWY_ATTR { PushOne(all.contacts[bundle.first + k], part, limit, sides, lane); };
       for (std::int32_t k = bundle.count - 1; k > 0; --k) push(backward ? bundle.count - 1 - k : k);
       for (std::int32_t k = 0; k < bundle.count; ++k) push(backward ? bundle.count - 1 - k : k);
       WriteSides(bundle, bundle.frame, all.standing, pushes, lane, sides);
@@ -299,8 +300,8 @@ void sweep_bundles(const BundleArrays& bundles, bool backward, Block8* motion) {
   HWY_DYNAMIC_DISPATCH(SweepBundles)(bundles, backward, motion);
 }
 
-void push_bundles(const BundleArrays& bundles, bool backward, Block8* pushes) {
-  HWY_DYNAMIC_DISPATCH(PushBundles)(bundles, backward, pushes);
+void push_bundles(const BundleArrays& bundles, bool backward, float share, float most, Block8* pushes) {
+  HWY_DYNAMIC_DISPATCH(PushBundles)(bundles, backward, share, most, pushes);
 }
 
 void find_residuals(const BundleArrays& bundles, const Block8* motion) {

@@ -180,11 +180,9 @@ void GameContacts::apply_last_forces(GameBodies& bodies, Jobs& jobs) {
   bundles_.in_order(jobs, false, [&](const BundleArrays& part) { apply_bundle_forces(part, bodies.answers().data()); });
 }
 
-bool GameContacts::begin_substep(const GameBodies& bodies, const SmallSteps& steps, Jobs& jobs) {
-  const auto most = static_cast<float>(steps.push_speed * bodies.plan().length());
-  bundles_.for_all(jobs, [&](const BundleArrays& part) {
-    measure_bundles(part, bodies.shifts().data(), bodies.shapes().data(), kPushShare, most);
-  });
+bool GameContacts::begin_substep(const GameBodies& bodies, Jobs& jobs) {
+  bundles_.for_all(
+      jobs, [&](const BundleArrays& part) { measure_bundles(part, bodies.shifts().data(), bodies.shapes().data()); });
   return bundles_.overlap();
 }
 
@@ -231,9 +229,11 @@ void GameContacts::sweep(GameBodies& bodies, bool backward, Jobs& jobs) {
   bundles_.in_order(jobs, backward, [&](const BundleArrays& part) { sweep_bundles(part, backward, motion); });
 }
 
-void GameContacts::push_apart(GameBodies& bodies, bool backward, Jobs& jobs) {
+void GameContacts::push_apart(GameBodies& bodies, double speed, bool backward, Jobs& jobs) {
+  const auto most = static_cast<float>(speed * bodies.plan().length());
   Block8* pushes = bodies.pushes().data();
-  bundles_.in_order(jobs, backward, [&](const BundleArrays& part) { push_bundles(part, backward, pushes); });
+  bundles_.in_order(jobs, backward,
+                    [&](const BundleArrays& part) { push_bundles(part, backward, kPushShare, most, pushes); });
 }
 
 void GameContacts::end_substep(const GameBodies& bodies, Jobs& jobs) {

@@ -48,12 +48,13 @@ class GameContacts {
   /// What the bodies of a substep get of the forces of the last step. @pre the first substep has not begun
   void apply_last_forces(GameBodies& bodies, Jobs& jobs);
   /// Measures gaps. @return whether something is to be pushed apart
-  bool begin_substep(const GameBodies& bodies, const SmallSteps& steps, Jobs& jobs);
+  bool begin_substep(const GameBodies& bodies, Jobs& jobs);
   /// After the forward sweep: leaves as much of the forces as adds no energy, of bodies that contacts tie together the
   /// largest share. @param moved y by joints and handles; none: nothing
   void limit_forces(GameBodies& bodies, std::span<const double> moved, Jobs& jobs);
   void sweep(GameBodies& bodies, bool backward, Jobs& jobs);
-  void push_apart(GameBodies& bodies, bool backward, Jobs& jobs);
+  /// @param speed m/s: how fast, at most
+  void push_apart(GameBodies& bodies, double speed, bool backward, Jobs& jobs);
   /// Notes what rebounds.
   void end_substep(const GameBodies& bodies, Jobs& jobs);
   /// Tells the contacts what acted on them.

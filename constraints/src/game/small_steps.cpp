@@ -75,14 +75,14 @@ void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const 
   bodies.turn_axes();
   constraints.make_rows(states, bodies, problem.constraints, number);
   bodies.begin_substep(number, jobs);
-  const bool overlap = contacts.begin_substep(bodies, steps, jobs);
+  const bool overlap = contacts.begin_substep(bodies, jobs);
   constraints.solve(bodies);
   contacts.sweep(bodies, false, jobs);
   contacts.limit_forces(bodies, constraints.moved(), jobs);
   contacts.sweep(bodies, true, jobs);
   if (overlap) {
     std::ranges::fill(bodies.pushes(), internal::Block8{});
-    for (const bool backward : {false, true}) contacts.push_apart(bodies, backward, jobs);
+    for (const bool backward : {false, true}) contacts.push_apart(bodies, steps.push_speed, backward, jobs);
   }
   bodies.end_substep(overlap, jobs);
   constraints.close(states, bodies, overlap);
