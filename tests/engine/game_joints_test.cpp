@@ -121,6 +121,50 @@ TEST(GameJoints, AHeavyEndThatDropsOnTheGroundLeavesItsLinksClosed) {
 }
 
 /// By both solvers: a step in which it turns by five radians is taken in parts.
+/// What turns by a radian within a substep must keep its energy by itself: joints know nothing of it.
+TEST(GameJoints, ASlenderPendulumGainsNoEnergyAtAnyStep) {
+  for (const double step : {1.0 / 60.0, 0.1, 0.3, 1.0})
+    for (const int links : {1, 3}) {
+      World world({.step = step});
+      world.set_contact_source(nullptr, kBySmallSteps);
+      const Vec3 half(0.15, links > 1 ? 0.05 : 0.03, links > 1 ? 0.05 : 0.03);
+      const auto bar = std::make_shared<const Shape>(Box{half});
+      std::vector<BodyId> bodies;
+      double scale = 0.0;
+      for (int i = 0; i < links; ++i) {
+        const Vec3 hook(2.0 * half.x() * i, 0.0, 0.0);
+        const BodyId before = i > 0 ? bodies.back() : BodyId{};
+        bodies.push_back(world.add_rigid(bar, 1000.0, {.pose = {.p = hook + half}}));
+        world.add_joint(before, bodies.back(), {.type = JointType::kBall, .frame = {.origin = hook}});
+        scale += world.model(bodies.back()).data().mass * kGravity * 2.0 * half.x() * links;
+      }
+      const double start = total_energy(world, bodies);
+      for (int i = 0; i < 500; ++i) {
+        world.step();
+        ASSERT_LT(total_energy(world, bodies) - start, 1e-2 * scale) << step << " s, " << links << ", " << i;
+      }
+    }
+}
+
+/// Nobody steps so. But no number may come of it that is none.
+TEST(GameJoints, AChainStaysFiniteAtStepsOfMinutes) {
+  for (const double step : {3.0, 10.0, 100.0}) {
+    World world({.step = step});
+    world.set_contact_source(nullptr, kBySmallSteps);
+    const auto bar = std::make_shared<const Shape>(Box{{0.15, 0.05, 0.05}});
+    BodyId before{};
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 hook(0.3 * i, 0.0, 0.0);
+      const BodyId link = world.add_rigid(bar, 1000.0, {.pose = {.p = hook + Vec3(0.15, 0.05, 0.05)}});
+      world.add_joint(before, link, {.type = JointType::kBall, .frame = {.origin = hook}});
+      before = link;
+    }
+    for (int i = 0; i < 1000; ++i) world.step();
+    EXPECT_TRUE(world.constraint_report().solved) << step;
+    EXPECT_LT(world.body(before).pose.p.norm(), 10.0) << step;
+  }
+}
+
 TEST(GameJoints, AFastTopPrecessesAndDoesNotFall) {
   for (const ContactOptions& options : {kBySmallSteps, exactly()})
     for (const double spin : {100.0, 300.0}) {

@@ -137,20 +137,133 @@ HWY_INLINE HWY_ATTR void Normalise(Wide* q) {
   for (std::size_t i = 0; i < 4; ++i) q[i] = hn::Div(q[i], norm);
 }
 
+/// m in the middle of a free turn that begins with it, in principal axes: m + a ω × m = its start, by Newton's method.
+/// It is never longer than that.
+HWY_INLINE HWY_ATTR void MiddleMomentum(const Wide* inverse, Wide a, const Wide* start, Wide* m) {
+  constexpr int kSteps = 4;
+  const Doubles d;
+  const Wide one = hn::Set(d, 1.0), least = hn::Set(d, std::numeric_limits<double>::min());
+  Wide c[3], square = hn::Zero(d);
+  for (std::size_t i = 0; i < 3; ++i) {
+    c[i] = hn::Mul(a, hn::Sub(inverse[(i + 1) % 3], inverse[(i + 2) % 3]));
+    m[i] = start[i], square = hn::MulAdd(start[i], start[i], square);
+  }
+  for (int step = 0; step < kSteps; ++step) {
+    Wide off[3], row[3][3], cofactor[3][3];
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+      off[i] = hn::Sub(hn::MulAdd(hn::Mul(c[i], m[j]), m[k], m[i]), start[i]);
+      row[i][i] = one, row[i][j] = hn::Mul(c[i], m[k]), row[i][k] = hn::Mul(c[i], m[j]);
+    }
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j) {
+        const std::size_t i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+        cofactor[i][j] = hn::NegMulAdd(row[i1][j2], row[i2][j1], hn::Mul(row[i1][j1], row[i2][j2]));
+      }
+    const Wide determinant = hn::MulAdd(row[0][0], cofactor[0][0],
+                                        hn::MulAdd(row[0][1], cofactor[0][1], hn::Mul(row[0][2], cofactor[0][2])));
+    const Wide by = hn::Div(one, hn::Max(determinant, hn::Set(d, 0.25)));  // less where no turn is resolved
+    Wide length = hn::Zero(d);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Wide sum =
+          hn::MulAdd(cofactor[0][i], off[0], hn::MulAdd(cofactor[1][i], off[1], hn::Mul(cofactor[2][i], off[2])));
+      m[i] = hn::NegMulAdd(by, sum, m[i]);
+      length = hn::MulAdd(m[i], m[i], length);
+    }
+    const Wide within = hn::Sqrt(hn::Min(one, hn::Div(square, hn::Max(length, least))));
+    for (std::size_t i = 0; i < 3; ++i) m[i] = hn::Mul(within, m[i]);
+  }
+}
+
+/// Turns attitudes about which a momentum has more than an energy, given twice, to where it has that, as little as may
+/// be: along the slope of the energy. In principal axes of attitudes. @param by the turn, in those
+HWY_INLINE HWY_ATTR void LoseEnergy(const Wide* inverse, const Wide* m, Wide twice, Wide* by) {
+  constexpr double kRounded = 1e-12;
+  const Doubles d;
+  const Wide zero = hn::Zero(d), one = hn::Set(d, 1.0), least = hn::Set(d, 1e-300);
+  Wide square = zero, energy = zero;
+  for (std::size_t i = 0; i < 3; ++i) square = hn::MulAdd(m[i], m[i], square);
+  const Wide per = hn::Div(one, hn::Sqrt(hn::Max(square, least)));
+  Wide u[3], slope[3], length = zero;
+  for (std::size_t i = 0; i < 3; ++i)
+    u[i] = hn::Mul(per, m[i]), energy = hn::MulAdd(hn::Mul(inverse[i], u[i]), u[i], energy);
+  for (std::size_t i = 0; i < 3; ++i) {
+    slope[i] = hn::Mul(u[i], hn::Sub(inverse[i], energy));
+    length = hn::MulAdd(slope[i], slope[i], length);
+  }
+  const Wide q = hn::Sqrt(length), per_slope = hn::Div(one, hn::Max(q, least));
+  Wide across = zero;
+  for (std::size_t i = 0; i < 3; ++i)
+    slope[i] = hn::Mul(per_slope, slope[i]), across = hn::MulAdd(hn::Mul(inverse[i], slope[i]), slope[i], across);
+  // On the circle through m and its slope e(θ) = e − 2p sin²θ + q sin 2θ; the nearest tan θ with e(θ) = e + change.
+  const Wide p = hn::Mul(hn::Set(d, 0.5), hn::Sub(energy, across));
+  const Wide radius = hn::Sqrt(hn::MulAdd(p, p, length));
+  const Wide asked = hn::Sub(hn::Mul(hn::Mul(hn::Set(d, 1.0 + kRounded), twice), hn::Mul(per, per)), energy);
+  const Wide change = hn::Min(zero, hn::Max(asked, hn::Neg(hn::Add(radius, p))));
+  const Wide root = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(change, hn::MulAdd(hn::Set(d, 2.0), p, change), length)));
+  const Wide tangent = hn::Div(change, hn::Max(hn::Add(q, root), least));
+  const Wide cosine = hn::Div(one, hn::Sqrt(hn::MulAdd(tangent, tangent, one)));
+  by[0] = hn::Add(one, cosine);
+  const Wide sine = hn::Mul(tangent, cosine);
+  const Wide none[3] = {zero, zero, zero};
+  AddCross(none, sine, u, slope, by + 1);
+}
+
+/// About a momentum, by what Cayley's map is short of the angle x: that by which a body turns about it in the mean.
+/// @param action x |L|
+HWY_INLINE HWY_ATTR void TurnAbout(const Wide* momentum, Wide action, Wide* q) {
+  const Doubles d;
+  Wide square = hn::Set(d, 1e-300), r[3], by[4], less[4], more[4], to[4];
+  for (std::size_t i = 0; i < 3; ++i) square = hn::MulAdd(momentum[i], momentum[i], square);
+  const Wide per = hn::Div(action, square);
+  for (std::size_t i = 0; i < 3; ++i) r[i] = hn::Mul(per, momentum[i]), less[1 + i] = hn::Mul(hn::Set(d, -0.5), r[i]);
+  less[0] = hn::Set(d, 1.0);
+  Turned(r, by);
+  Product(by, less, more);
+  Product(more, q, to);
+  Normalise(to);
+  for (std::size_t i = 0; i < 4; ++i) q[i] = to[i];
+}
+
+/// Attitudes after a free turn. @param q before and after. @param momentum world
+HWY_INLINE HWY_ATTR void TurnFreely(const EightFrames& f, const Wide* momentum, Wide time, std::size_t lane, Wide* q) {
+  const Doubles d;
+  Wide R[3][3], body[3], start[3], m[3], inverse[3], spin[3], by[4], to[4], end[3];
+  Rotation(q, R);
+  Turn(R, true, momentum, body);
+  Multiply(f.principal, true, body, lane, start);
+  Wide twice = hn::Zero(d);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Wide root = Get(f.roots[i], lane);
+    inverse[i] = hn::Div(hn::Set(d, 1.0), hn::Mul(root, root));
+    twice = hn::MulAdd(hn::Mul(inverse[i], start[i]), start[i], twice);
+  }
+  MiddleMomentum(inverse, hn::Mul(hn::Set(d, 0.5), time), start, m);
+  for (std::size_t i = 0; i < 3; ++i) spin[i] = hn::Mul(inverse[i], m[i]);
+  Multiply(f.principal, false, spin, lane, by + 1);
+  by[0] = hn::Div(hn::Set(d, 2.0), time);  // a quaternion of any length
+  Product(q, by, to);
+  Normalise(to);
+  TurnAbout(momentum, hn::Mul(time, twice), to);
+  Rotation(to, R);
+  Turn(R, true, momentum, body);
+  Multiply(f.principal, true, body, lane, end);
+  LoseEnergy(inverse, end, twice, by);
+  const Wide vector[3] = {hn::Neg(by[1]), hn::Neg(by[2]), hn::Neg(by[3])};
+  Multiply(f.principal, false, vector, lane, by + 1);
+  Product(to, by, q);
+  Normalise(q);
+}
+
 HWY_INLINE HWY_ATTR void TurnLanes(EightFrames& f, double time, std::size_t lane) {
   const Doubles d;
   const auto turns = hn::Gt(Get(f.turns_axes, lane), hn::Zero(d));
-  Wide x[3], momentum[3], body[3], spin[3], before[4], by[4], q[4], R[3][3], torque[3];
+  if (hn::AllFalse(d, turns)) return;
+  Wide x[3], momentum[3], q[4], R[3][3], torque[3];
   for (std::size_t i = 0; i < 3; ++i) x[i] = Get(f.now.turn[i], lane), torque[i] = Get(f.loads.torque[i], lane);
   Multiply(f.momentum, true, x, lane, momentum);
-  for (std::size_t i = 0; i < 4; ++i) before[i] = Get(f.now.attitude[i], lane);
-  Rotation(before, R);
-  Turn(R, true, momentum, body);
-  Multiply(f.inverse_inertia, false, body, lane, spin);
-  Turn(R, false, spin, by + 1);
-  by[0] = hn::Set(d, 4.0 / time);  // a quaternion of any length
-  Product(by, before, q);
-  Normalise(q);
+  for (std::size_t i = 0; i < 4; ++i) q[i] = Get(f.now.attitude[i], lane);
+  if (time > 0.0) TurnFreely(f, momentum, hn::Set(d, 0.5 * time), lane, q);
   Rotation(q, R);
   for (std::size_t i = 0; i < 3; ++i) {
     const Wide root = Get(f.roots[i], lane);
@@ -253,6 +366,15 @@ HWY_INLINE HWY_ATTR void EndLanes(EightFrames& f, double h, std::size_t lane, co
   for (std::size_t i = 0; i < 4; ++i) before[i] = Get(f.now.attitude[i], lane);
   Product(turned, before, after);
   Normalise(after);
+  const auto turns = hn::Gt(Get(f.turns_axes, lane), hn::Zero(d));
+  if (!hn::AllFalse(d, turns)) {
+    Wide turn[3], momentum[3], freely[4];
+    for (std::size_t i = 0; i < 3; ++i) turn[i] = Get(f.now.turn[i], lane);
+    Multiply(f.momentum, true, turn, lane, momentum);
+    for (std::size_t i = 0; i < 4; ++i) freely[i] = before[i], Put(before[i], f.now.from[i], lane);
+    TurnFreely(f, momentum, length, lane, freely);
+    for (std::size_t i = 0; i < 4; ++i) after[i] = hn::IfThenElse(turns, freely[i], after[i]);
+  }
   for (std::size_t i = 0; i < 4; ++i) {
     Put(turned[i], f.now.turned[i], lane);
     Put(hn::IfThenElse(is_free, after[i], before[i]), f.now.attitude[i], lane);
@@ -274,6 +396,36 @@ HWY_ATTR void EndFrames(const FrameArrays& all, bool pushed) {
   }
 }
 
+HWY_INLINE HWY_ATTR void PlaceLanes(EightFrames& f, double h, bool again, std::size_t lane) {
+  const Doubles d;
+  const auto turns = hn::Gt(Get(f.turns_axes, lane), hn::Zero(d));
+  if (hn::AllFalse(d, turns)) return;
+  Wide turn[3], momentum[3], q[4], by[4], placed[4];
+  for (std::size_t i = 0; i < 4; ++i) q[i] = Get(again ? f.now.from[i] : f.now.attitude[i], lane);
+  if (again) {
+    for (std::size_t i = 0; i < 3; ++i) turn[i] = Get(f.now.turn[i], lane);
+    Multiply(f.momentum, true, turn, lane, momentum);
+    TurnFreely(f, momentum, hn::Set(d, h), lane, q);
+  }
+  by[0] = hn::Set(d, 1.0);
+  for (std::size_t i = 0; i < 3; ++i) {
+    by[1 + i] = hn::Mul(hn::Set(d, 0.5), Get(f.now.way[i], lane));
+    Put(hn::Zero(d), f.now.way[i], lane);
+  }
+  Product(by, q, placed);
+  Normalise(placed);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Wide before = Get(f.now.attitude[i], lane);
+    Put(hn::IfThenElse(turns, placed[i], before), f.now.attitude[i], lane);
+  }
+}
+
+HWY_ATTR void PlaceFrames(const FrameArrays& all, bool again) {
+  for (std::size_t g = 0; g < all.count; ++g)
+    for (std::size_t lane = 0; lane < kFramesAtOnce; lane += kDoubles)
+      PlaceLanes(all.frames[g], all.length, again, lane);
+}
+
 }  // namespace limber::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -283,12 +435,15 @@ namespace limber::internal {
 HWY_EXPORT(TurnFrames);
 HWY_EXPORT(BeginFrames);
 HWY_EXPORT(EndFrames);
+HWY_EXPORT(PlaceFrames);
 
 void turn_frames(const FrameArrays& all, double time) { HWY_DYNAMIC_DISPATCH(TurnFrames)(all, time); }
 
 void begin_frames(const FrameArrays& all) { HWY_DYNAMIC_DISPATCH(BeginFrames)(all); }
 
 void end_frames(const FrameArrays& all, bool pushed) { HWY_DYNAMIC_DISPATCH(EndFrames)(all, pushed); }
+
+void place_frames(const FrameArrays& all, bool again) { HWY_DYNAMIC_DISPATCH(PlaceFrames)(all, again); }
 
 }  // namespace limber::internal
 #endif

@@ -36,6 +36,8 @@ struct EightFrames {
     Double8 shift[3], attitude[4], v[3], turn[3];
     Double8 free_turn[3];  // the turn of the substep at hand if nothing acted
     Double8 turned[4];     // by the last substep
+    Double8 from[4];       // attitude at the start of the substep
+    Double8 way[3];        // by how much place_frames() is to turn it
   } now;
 };
 
@@ -55,11 +57,16 @@ struct FrameArrays {
   }
 };
 
+/// Free turns here keep momentum and energy whatever their length: the implicit midpoint rule, by Cayley's map.
+///
 /// Coordinates of turns become those about the principal axes as they will be after half of a time, by the momentum.
 void turn_frames(const FrameArrays& all, double time);
 /// Loads and damping; free motion, y with the answers of the substep before, and how frames have shifted.
 void begin_frames(const FrameArrays& all);
 /// Answers, and where frames go by them. @param pushed whether pushes move them too
 void end_frames(const FrameArrays& all, bool pushed);
+/// Of what turns its axes: where its momentum brings it by the substep's end, and then its way.
+/// @param again whether the momentum has changed
+void place_frames(const FrameArrays& all, bool again);
 
 }  // namespace limber::internal

@@ -184,7 +184,7 @@ Vec3 GameBodies::momentum_of(std::size_t at) const {
 }
 
 void GameBodies::turn_axes() {
-  turn_frames({.frames = frames_.data(), .count = frames_.size()}, plan_.length());
+  turn_frames({.frames = frames_.data(), .count = frames_.size()}, 0.0);
   take_axes();
   for (std::size_t at = 0; at < bodies_.size(); ++at) {
     const GameBody& body = bodies_[at];
@@ -390,15 +390,15 @@ void GameBodies::displace(std::int32_t number, const double* speed, const double
   const double h = plan_.length();
   const auto vector = [](const double* from) { return Vec3(from[0], from[1], from[2]); };
   put(vector_in(of.now.turn, lane) + vector(speed + 3), of.now.turn, lane);
-  put(turned(quaternion_in(of.now.attitude, lane),
-             h * (body.turn_scale.transpose() * (vector(speed + 3) + vector(place + 3)))),
-      of.now.attitude, lane);
+  const auto way = [&](const Vec3& by) { return Vec3(h * (body.turn_scale.transpose() * by)); };
+  if (of.turns_axes.v[lane] > 0.0)
+    put(way(vector(place + 3)), of.now.way, lane);
+  else
+    put(turned(quaternion_in(of.now.attitude, lane), way(vector(speed + 3) + vector(place + 3))), of.now.attitude,
+        lane);
   if (body.led < 0) {
     put(vector_in(of.now.v, lane) + vector(speed) / body.root_mass, of.now.v, lane);
     put(vector_in(of.now.shift, lane) + h / body.root_mass * (vector(speed) + vector(place)), of.now.shift, lane);
-    show(at);
-  } else {
-    tell_led(at);
   }
   if (body.modes == nullptr) return;
   const std::span<double> z = body.group->amplitudes_in_parts(body.slot), rates = body.group->rates_in_parts(body.slot);
@@ -408,6 +408,26 @@ void GameBodies::displace(std::int32_t number, const double* speed, const double
     rates[i] += static_cast<double>(by[i]) * speed[8 + i];
   }
   write_modes(body, shapes_);
+}
+
+void GameBodies::end_displacing(bool again) {
+  place_frames({.frames = frames_.data(), .count = frames_.size(), .length = plan_.length()}, again);
+}
+
+void GameBodies::write_motion(std::int32_t number, double* to) const {
+  const auto at = static_cast<std::size_t>(number), lane = at % kFramesAtOnce;
+  const GameBody& body = bodies_[at];
+  const EightFrames::Now& now = frames_[at / kFramesAtOnce].now;
+  for (std::size_t i = 0; i < 3; ++i)
+    to[i] = body.root_mass * now.v[i].v[lane], to[3 + i] = now.turn[i].v[lane], to[6 + i % 2] = 0.0;
+  for (std::int32_t b = 1; b < body.blocks; ++b)
+    for (std::int32_t l = 0; l < 8; ++l)
+      to[8 * b + l] = static_cast<double>(shapes_[static_cast<std::size_t>(body.first + b)].v[l]);
+}
+
+void GameBodies::tell(std::int32_t number) {
+  const auto at = static_cast<std::size_t>(number);
+  bodies_[at].led < 0 ? show(at) : tell_led(at);
 }
 
 /// To its group.

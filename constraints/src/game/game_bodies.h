@@ -74,6 +74,12 @@ class GameBodies {
   /// Moves one of them further. @param speed, place changes of its coordinates: with the speed that goes with them, and
   /// without
   void displace(std::int32_t number, const double* speed, const double* place);
+  /// Turns all that have been displaced. @param again whether any speed has changed
+  void end_displacing(bool again);
+  /// Coordinates of one of them as they are now. @param to as many as it has, whole blocks
+  void write_motion(std::int32_t number, double* to) const;
+  /// Tells its group where one of them is.
+  void tell(std::int32_t number);
   /// Their groups take over.
   void end_step();
 

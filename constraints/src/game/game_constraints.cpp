@@ -13,6 +13,8 @@ namespace {
 constexpr SmallStepTuning kTuning = kConstraintsTuning.small_steps;
 // What a force may be beyond a bound, and a row open beyond one, for round-off: of the bound, and m or rad.
 constexpr double kRounded = 1e-9;
+// Of energies of motions in single precision.
+constexpr double kSingle = 1e-6;
 
 using Hold = GameRow::Hold;
 
@@ -115,15 +117,50 @@ bool GameConstraints::let_go(bool takes_hold) {
 /// Makes moved_ a motion, and adds it. Twice the energy of what the rows took so, by component.
 void GameConstraints::take(std::vector<Block8>& motion) {
   taken_.assign(system_.components(), 0.0);
+  limits_.assign(system_.components(), {});
+  y_.resize(rows_.coordinates());
   for (const RowBody& body : system_.bodies()) {
-    double* at = moved_.data() + 8 * body.first;
+    double *at = moved_.data() + 8 * body.first, *y = y_.data() + 8 * body.first;
     double& sum = taken_[static_cast<std::size_t>(body.component)];
-    for (std::int32_t l = 0; l < 8 * body.blocks; ++l) sum += at[l] * at[l];
+    for (std::int32_t l = 0; l < 8 * body.blocks; ++l) {
+      sum += at[l] * at[l];
+      y[l] = static_cast<double>(motion[static_cast<std::size_t>(body.first + l / 8)].v[l % 8]);
+    }
     rows_.unscale(body, at);
-    for (Block8& block :
-         std::span(motion).subspan(static_cast<std::size_t>(body.first), static_cast<std::size_t>(body.blocks))) {
-      for (std::size_t l = 0; l < 8; ++l) block.v[l] += static_cast<float>(at[l]);
-      at += 8;
+  }
+  for (std::size_t i = 0; i < forces_.size(); ++i) forces_[i] = rows_.rows()[i].force;
+  limit_change(moved_);
+  for (const RowBody& body : system_.bodies())
+    for (std::size_t b = static_cast<std::size_t>(body.first), end = b + static_cast<std::size_t>(body.blocks); b < end;
+         ++b)
+      for (std::size_t l = 0; l < 8; ++l) motion[b].v[l] += static_cast<float>(moved_[8 * b + l]);
+}
+
+/// Of y_, by forces_: leaves as much of y_ + change as has the energy of limits_ and what the targets' rates give. Rows
+/// that meet them give no more, but for the scales of turns.
+void GameConstraints::limit_change(std::vector<double>& change) {
+  const std::span<const GameGroup> groups = rows_.groups();
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    for (std::size_t i = groups[g].first; i < groups[g].first + groups[g].count; ++i)
+      limits_[system_.component(g)].most += 2.0 * forces_[i] * rows_.rows()[i].target;
+  for (const RowBody& body : system_.bodies()) {
+    Limit& limit = limits_[static_cast<std::size_t>(body.component)];
+    for (std::int32_t l = 8 * body.first; l < 8 * (body.first + body.blocks); ++l) {
+      const auto i = static_cast<std::size_t>(l);
+      limit.most += y_[i] * y_[i], limit.has += (y_[i] + change[i]) * (y_[i] + change[i]);
+    }
+  }
+  for (Limit& limit : limits_) {
+    const bool within = limit.has <= (1.0 + kSingle) * limit.most;
+    limit.share = within ? 1.0 : std::sqrt(std::max(0.0, limit.most) / limit.has);
+    limit.has *= limit.share * limit.share;
+  }
+  for (const RowBody& body : system_.bodies()) {
+    const double share = limits_[static_cast<std::size_t>(body.component)].share;
+    if (share == 1.0) continue;
+    for (std::int32_t l = 8 * body.first; l < 8 * (body.first + body.blocks); ++l) {
+      const auto i = static_cast<std::size_t>(l);
+      change[i] = share * (y_[i] + change[i]) - y_[i];
     }
   }
 }
@@ -212,17 +249,33 @@ void GameConstraints::displace(GameBodies& bodies) {
   }
   rows_.add_transposed(forces_, speed_);
   rows_.add_transposed(products_, place_);
-  move(bodies);
+  limit_speeds(bodies);
+  move(bodies, true);
 }
 
-/// By speed_ and place_.
-void GameConstraints::move(GameBodies& bodies) {
+/// What the rows took before, they may give.
+void GameConstraints::limit_speeds(const GameBodies& bodies) {
+  for (Limit& limit : limits_) limit = {.most = std::max(0.0, limit.most - limit.has)};
+  for (const RowBody& body : system_.bodies()) {
+    bodies.write_motion(body.frame, y_.data() + 8 * body.first);
+    rows_.unscale(body, speed_.data() + 8 * body.first);
+  }
+  limit_change(speed_);
+}
+
+/// By speed_ and place_. @param speeds whether there are any
+void GameConstraints::move(GameBodies& bodies, bool speeds) {
   for (const RowBody& body : system_.bodies()) {
     double *speed = speed_.data() + 8 * body.first, *place = place_.data() + 8 * body.first;
-    rows_.unscale(body, speed);
     rows_.unscale(body, place);
     bodies.displace(body.frame, speed, place);
   }
+  end_moving(bodies, speeds);
+}
+
+void GameConstraints::end_moving(GameBodies& bodies, bool speeds) {
+  bodies.end_displacing(speeds);
+  for (const RowBody& body : system_.bodies()) bodies.tell(body.frame);
 }
 
 void GameConstraints::end_substep(const BodyStates& states, GameBodies& bodies, bool last) {
@@ -287,6 +340,7 @@ void GameConstraints::shorten_closing(GameBodies& bodies) {
     for (std::int32_t l = 0; l < 8 * body.blocks; ++l) place[l] *= back;
     bodies.displace(body.frame, speed_.data() + 8 * body.first, place);
   }
+  end_moving(bodies, false);
 }
 
 /// Limits hold where they are passed.
@@ -318,7 +372,7 @@ void GameConstraints::close_errors(GameBodies& bodies) {
   forces_.assign(rows_.rows().size(), 0.0);
   system_.for_met(rows_, [&](std::size_t i, std::size_t k) { forces_[i] = rows_.rows()[i].closing = right_[k]; });
   rows_.add_transposed(forces_, place_);
-  move(bodies);
+  move(bodies, false);
 }
 
 bool GameConstraints::all_finite() const {

@@ -15,6 +15,10 @@ class GameConstraints {
   struct Closing {
     double before = 0.0, both = 0.0, after = 0.0;
   };
+  /// Twice the energy that a motion may have and has, and what share of the motion is left.
+  struct Limit {
+    double most = 0.0, has = 0.0, share = 1.0;
+  };
 
   /// The rows of a substep, from where it begins. @param number of the substep, 0 …
   void make_rows(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
@@ -45,7 +49,10 @@ class GameConstraints {
   void measure(const BodyStates& states, const GameBodies& bodies, bool pushed);
   void find_shares();
   void displace(GameBodies& bodies);
-  void move(GameBodies& bodies);
+  void move(GameBodies& bodies, bool speeds);
+  void limit_change(std::vector<double>& change);
+  void limit_speeds(const GameBodies& bodies);
+  void end_moving(GameBodies& bodies, bool speeds);
   void close_step(const BodyStates& states, GameBodies& bodies);
   void find_errors(const BodyStates& states);
   void close_errors(GameBodies& bodies);
@@ -59,8 +66,10 @@ class GameConstraints {
   std::vector<double> taken_, given_;             // energies by component
   std::vector<double> right_, asked_;             // of the system
   std::vector<double> speed_, place_, pushes_;    // in the rows' coordinates
+  std::vector<double> y_;                         // a motion, in the bodies' coordinates
   std::vector<double> gaps_, forces_, products_;  // by row: scratch; products_ keeps J motion_ of a solution
   std::vector<Closing> closings_;                 // by component
+  std::vector<Limit> limits_;                     // likewise
   double residual_ = 0.0;
 };
 
