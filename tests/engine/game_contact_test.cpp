@@ -121,6 +121,26 @@ TEST(GameContact, CubesSetDownInLineStayInLine) {
   }
 }
 
+/// Rows stay where they are while a body turns on by many times: its turn must not grow by that.
+TEST(GameContact, WhatTumblesDownLandsWhateverStepComesBetween) {
+  for (const double pause : {1.0, 10.0, 100.0, 3600.0})
+    for (const int at : {5, 14, 20}) {
+      Bricks scene;
+      const auto bar = std::make_shared<const Shape>(Box{{0.15, 0.05, 0.03}});
+      const BodyId body = scene.world.add_rigid(
+          bar, 1000.0,
+          {.pose = {.p = {0.0, 0.0, 0.25}}, .velocity = {1.0, 0.0, -1.0}, .angular_velocity = {0.0, 3.0, 2.0}});
+      scene.step(at);
+      scene.world.set_step(pause);
+      scene.step(1);
+      ASSERT_TRUE(scene.world.body(body).pose.p.allFinite()) << pause << " s after " << at;
+      EXPECT_LT(scene.world.body(body).velocity.norm(), 2.0 * kGravity * (1.0 + pause)) << at;
+      scene.world.set_step(1.0 / 60.0);
+      scene.step(10);
+      EXPECT_TRUE(scene.world.constraint_report().solved) << pause << " s after " << at;
+    }
+}
+
 TEST(GameContact, LightBricksCarryOneAHundredTimesAsHeavy) {
   for (const auto& [light, substeps] : {std::pair{1, 16}, std::pair{2, 24}}) {
     Bricks scene(game(substeps));

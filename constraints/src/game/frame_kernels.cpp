@@ -137,6 +137,14 @@ HWY_INLINE HWY_ATTR void Normalise(Wide* q) {
   for (std::size_t i = 0; i < 4; ++i) q[i] = hn::Div(q[i], norm);
 }
 
+/// About the principal axes.
+HWY_INLINE HWY_ATTR void InverseInertia(const EightFrames& f, std::size_t lane, Wide* inverse) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Wide root = Get(f.roots[i], lane);
+    inverse[i] = hn::Div(hn::Set(Doubles(), 1.0), hn::Mul(root, root));
+  }
+}
+
 /// m in the middle of a free turn that begins with it, in principal axes: m + a ω × m = its start, by Newton's method.
 /// It is never longer than that.
 HWY_INLINE HWY_ATTR void MiddleMomentum(const Wide* inverse, Wide a, const Wide* start, Wide* m) {
@@ -232,12 +240,9 @@ HWY_INLINE HWY_ATTR void TurnFreely(const EightFrames& f, const Wide* momentum, 
   Rotation(q, R);
   Turn(R, true, momentum, body);
   Multiply(f.principal, true, body, lane, start);
+  InverseInertia(f, lane, inverse);
   Wide twice = hn::Zero(d);
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Wide root = Get(f.roots[i], lane);
-    inverse[i] = hn::Div(hn::Set(d, 1.0), hn::Mul(root, root));
-    twice = hn::MulAdd(hn::Mul(inverse[i], start[i]), start[i], twice);
-  }
+  for (std::size_t i = 0; i < 3; ++i) twice = hn::MulAdd(hn::Mul(inverse[i], start[i]), start[i], twice);
   MiddleMomentum(inverse, hn::Mul(hn::Set(d, 0.5), time), start, m);
   for (std::size_t i = 0; i < 3; ++i) spin[i] = hn::Mul(inverse[i], m[i]);
   Multiply(f.principal, false, spin, lane, by + 1);
@@ -292,15 +297,15 @@ HWY_ATTR void TurnFrames(const FrameArrays& all, double time) {
 HWY_INLINE HWY_ATTR void FreeTurn(const EightFrames& f, double h, const Wide (*R)[3], const Wide* turn,
                                   std::size_t lane, Wide* free) {
   const Doubles d;
-  const Wide half = hn::Set(d, 0.5 * h);
-  Wide world[3], momentum[3], now[3], later[3], middle[3], spin[3];
+  Wide world[3], body[3], start[3], m[3], inverse[3];
   Multiply(f.momentum, true, turn, lane, world);
-  Turn(R, true, world, momentum);
-  Multiply(f.inverse_inertia, false, momentum, lane, now);
-  AddCross(momentum, half, momentum, now, later);
-  Multiply(f.inverse_inertia, false, later, lane, middle);
-  AddCross(middle, half, now, middle, spin);
-  Turn(R, false, spin, world);
+  Turn(R, true, world, body);
+  Multiply(f.principal, true, body, lane, start);
+  InverseInertia(f, lane, inverse);
+  MiddleMomentum(inverse, hn::Set(d, 0.5 * h), start, m);
+  for (std::size_t i = 0; i < 3; ++i) m[i] = hn::Mul(inverse[i], m[i]);
+  Multiply(f.principal, false, m, lane, body);
+  Turn(R, false, body, world);
   Multiply(f.momentum, false, world, lane, free);
   const auto keeps = hn::Gt(Get(f.keeps_axes, lane), hn::Zero(d));
   for (std::size_t i = 0; i < 3; ++i) free[i] = hn::IfThenElse(keeps, free[i], turn[i]);

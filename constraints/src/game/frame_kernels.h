@@ -18,15 +18,14 @@ struct alignas(64) Double8 {
 struct EightFrames {
   // Blocks of their coordinates; −1: a lane without a body, as are those after it.
   std::int32_t first[kFramesAtOnce] = {-1, -1, -1, -1, -1, -1, -1, -1};
-  Double8 start[3][3];            // R at the step's start
-  Double8 turn_scale[3][3];       // ω = turn_scaleᵀ coordinates
-  Double8 momentum[3][3];         // L = momentumᵀ coordinates, world
-  Double8 inverse_inertia[3][3];  // body axes, 1/(kg·m²)
-  Double8 keeps_axes;             // 1: its rows stay while it turns, so that its momentum tells how; 0: else
-  Double8 turns_axes;             // 1: turn_frames() is for it; 0: else
-  Double8 principal[3][3];        // its principal axes in the body, as columns
-  Double8 roots[3];               // of the moments of inertia about them
-  Double8 root_mass, per_root;    // √m, 1/√m; 0: led
+  Double8 start[3][3];          // R at the step's start
+  Double8 turn_scale[3][3];     // ω = turn_scaleᵀ coordinates
+  Double8 momentum[3][3];       // L = momentumᵀ coordinates, world
+  Double8 keeps_axes;           // 1: its rows stay while it turns, so that its momentum tells how; 0: else
+  Double8 turns_axes;           // 1: turn_frames() is for it; 0: else
+  Double8 principal[3][3];      // its principal axes in the body, as columns
+  Double8 roots[3];             // of the moments of inertia about them
+  Double8 root_mass, per_root;  // √m, 1/√m; 0: led
   /// With a substep's loads and damping v becomes left v + gain, and so do the turn's coordinates.
   struct Loads {
     Double8 left, gain[3], turn_left, turn_gain[3];

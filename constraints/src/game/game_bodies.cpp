@@ -130,7 +130,6 @@ void GameBodies::place_frame(std::size_t at, const RigidFrame& frame) {
   const Mat3 axes = to_matrix(c.principal.q_BP);
   put(axes, of.principal, lane);
   put(body.roots, of.roots, lane);
-  put(Mat3(axes * c.principal.moments.cwiseInverse().asDiagonal() * axes.transpose()), of.inverse_inertia, lane);
   if (c.motion != FrameMotion::kLine && !body.turns_locked) {
     of.turns_axes.v[lane] = 1.0;
     put(Mat3::Identity(), of.momentum, lane);
