@@ -105,8 +105,11 @@ class Scene {
     start_ = state();
     for (; result.steps < steps && result.finite; ++result.steps) {
       step(random);
-      const double now = total(), node_now = node_total(result);
-      result.finite = std::isfinite(now) && std::isfinite(node_now);
+      const double now = total();
+      result.finite = std::isfinite(now);
+      if (!result.finite) break;  // nobody draws such a body
+      const double node_now = node_total(result);
+      result.finite = std::isfinite(node_now);
       result.worst_rise = std::max(result.worst_rise, (now - before) / scale_);
       result.total_rise = std::max(result.total_rise, (now - first) / scale_);
       result.node_worst_rise = std::max(result.node_worst_rise, (node_now - node_before) / scale_);
