@@ -121,6 +121,13 @@ struct SmallStepTuning {
   /// below what the lightest of bodies on the heaviest chain leaves.
   double regular = 1e-9;
   int most_gradients = 8;  ///< steps of conjugate gradients where joints of many loops are not joined. [path]
+  /// Newton's steps for the middle momentum of a free turn. [path] Bounds the work: two or three reach round-off where
+  /// a turn within a substep is resolved.
+  int turn_iterations = 4;
+  double least_turn_pivot =
+      0.25;                     ///< of their determinant, 1 at no turn: below it a turn is not resolved. By judgement
+  double turn_digits = 1e-12;   ///< of the energy of a free turn: round-off, which is not turned away
+  double motion_digits = 1e-6;  ///< of energies of motions, which are in single precision
 };
 
 struct ConstraintsTuning {

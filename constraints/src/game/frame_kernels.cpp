@@ -3,6 +3,8 @@
 #include <limits>
 #include <numbers>
 
+#include "../tuning.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "game/frame_kernels.cpp"
 // Arrays of vectors, as in bundle_sweep_kernels.cpp.
@@ -19,6 +21,7 @@ using Doubles = hn::CappedTag<double, kFramesAtOnce>;
 using Wide = hn::Vec<Doubles>;
 using Singles = hn::Rebind<float, Doubles>;
 constexpr std::size_t kDoubles = hn::MaxLanes(Doubles());
+constexpr const SmallStepTuning& kTurns = kConstraintsTuning.small_steps;
 
 HWY_INLINE HWY_ATTR Wide Get(const Double8& from, std::size_t lane) { return hn::Load(Doubles(), from.v + lane); }
 HWY_INLINE HWY_ATTR void Put(Wide x, Double8& to, std::size_t lane) { hn::Store(x, Doubles(), to.v + lane); }
@@ -148,7 +151,6 @@ HWY_INLINE HWY_ATTR void InverseInertia(const EightFrames& f, std::size_t lane, 
 /// m in the middle of a free turn that begins with it, in principal axes: m + a ω × m = its start, by Newton's method.
 /// It is never longer than that.
 HWY_INLINE HWY_ATTR void MiddleMomentum(const Wide* inverse, Wide a, const Wide* start, Wide* m) {
-  constexpr int kSteps = 4;
   const Doubles d;
   const Wide one = hn::Set(d, 1.0), least = hn::Set(d, std::numeric_limits<double>::min());
   Wide c[3], square = hn::Zero(d);
@@ -156,7 +158,7 @@ HWY_INLINE HWY_ATTR void MiddleMomentum(const Wide* inverse, Wide a, const Wide*
     c[i] = hn::Mul(a, hn::Sub(inverse[(i + 1) % 3], inverse[(i + 2) % 3]));
     m[i] = start[i], square = hn::MulAdd(start[i], start[i], square);
   }
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kTurns.turn_iterations; ++step) {
     Wide off[3], row[3][3], cofactor[3][3];
     for (std::size_t i = 0; i < 3; ++i) {
       const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
@@ -170,7 +172,7 @@ HWY_INLINE HWY_ATTR void MiddleMomentum(const Wide* inverse, Wide a, const Wide*
       }
     const Wide determinant = hn::MulAdd(row[0][0], cofactor[0][0],
                                         hn::MulAdd(row[0][1], cofactor[0][1], hn::Mul(row[0][2], cofactor[0][2])));
-    const Wide by = hn::Div(one, hn::Max(determinant, hn::Set(d, 0.25)));  // less where no turn is resolved
+    const Wide by = hn::Div(one, hn::Max(determinant, hn::Set(d, kTurns.least_turn_pivot)));
     Wide length = hn::Zero(d);
     for (std::size_t i = 0; i < 3; ++i) {
       const Wide sum =
@@ -186,7 +188,6 @@ HWY_INLINE HWY_ATTR void MiddleMomentum(const Wide* inverse, Wide a, const Wide*
 /// Turns attitudes about which a momentum has more than an energy, given twice, to where it has that, as little as may
 /// be: along the slope of the energy. In principal axes of attitudes. @param by the turn, in those
 HWY_INLINE HWY_ATTR void LoseEnergy(const Wide* inverse, const Wide* m, Wide twice, Wide* by) {
-  constexpr double kRounded = 1e-12;
   const Doubles d;
   const Wide zero = hn::Zero(d), one = hn::Set(d, 1.0), least = hn::Set(d, 1e-300);
   Wide square = zero, energy = zero;
@@ -206,7 +207,7 @@ HWY_INLINE HWY_ATTR void LoseEnergy(const Wide* inverse, const Wide* m, Wide twi
   // On the circle through m and its slope e(θ) = e − 2p sin²θ + q sin 2θ; the nearest tan θ with e(θ) = e + change.
   const Wide p = hn::Mul(hn::Set(d, 0.5), hn::Sub(energy, across));
   const Wide radius = hn::Sqrt(hn::MulAdd(p, p, length));
-  const Wide asked = hn::Sub(hn::Mul(hn::Mul(hn::Set(d, 1.0 + kRounded), twice), hn::Mul(per, per)), energy);
+  const Wide asked = hn::Sub(hn::Mul(hn::Mul(hn::Set(d, 1.0 + kTurns.turn_digits), twice), hn::Mul(per, per)), energy);
   const Wide change = hn::Min(zero, hn::Max(asked, hn::Neg(hn::Add(radius, p))));
   const Wide root = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(change, hn::MulAdd(hn::Set(d, 2.0), p, change), length)));
   const Wide tangent = hn::Div(change, hn::Max(hn::Add(q, root), least));

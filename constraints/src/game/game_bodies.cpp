@@ -417,8 +417,8 @@ void GameBodies::write_motion(std::int32_t number, double* to) const {
   const auto at = static_cast<std::size_t>(number), lane = at % kFramesAtOnce;
   const GameBody& body = bodies_[at];
   const EightFrames::Now& now = frames_[at / kFramesAtOnce].now;
-  for (std::size_t i = 0; i < 3; ++i)
-    to[i] = body.root_mass * now.v[i].v[lane], to[3 + i] = now.turn[i].v[lane], to[6 + i % 2] = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) to[i] = body.root_mass * now.v[i].v[lane], to[3 + i] = now.turn[i].v[lane];
+  to[6] = to[7] = 0.0;
   for (std::int32_t b = 1; b < body.blocks; ++b)
     for (std::int32_t l = 0; l < 8; ++l)
       to[8 * b + l] = static_cast<double>(shapes_[static_cast<std::size_t>(body.first + b)].v[l]);

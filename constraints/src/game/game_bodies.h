@@ -2,10 +2,10 @@
 //
 //   y = y_free + q,   q = Σ Jᵀf
 //
-// Coordinates of a frame: √m v (three) and I^½ ω about the principal axes as they are in the middle of
-// the step (three; one for a body on a line); of a mode z/√ρ (substep_modes.h). f are forces held over the substep; a
-// unit of one moves each by the row again: rows are h M^-½ n for frames and √ρ U for modes, so that J y is a
-// displacement over the substep, and the effective mass 1/(J Jᵀ).
+// Coordinates of a frame: √m v (three) and I^½ ω (three; one for a body on a line) about the principal axes as they are
+// in the middle of the step, for what keeps its rows, else at the substep's start; of a mode z/√ρ (substep_modes.h). f
+// are forces held over the substep; a unit of one moves each by the row again: rows are h M^-½ n for frames and √ρ U
+// for modes, so that J y is a displacement over the substep, and the effective mass 1/(J Jᵀ).
 #pragma once
 
 #include <memory>
@@ -61,7 +61,7 @@ class GameBodies {
   void begin_step(std::span<const ConstrainedBody> table, std::span<const Index> members, const SubstepPlan& plan);
   /// Something has rows in its coordinates for the whole step.
   void keep_axes(std::int32_t at);
-  /// The inertia of the others becomes that of the coming substep's middle.
+  /// The inertia of the others becomes that of the coming substep's start; of what locks or a line hold, its middle.
   void turn_axes();
   /// Free motion of all, and with the forces of the substep before. @param number 0 …
   void begin_substep(int number, Jobs& jobs);

@@ -13,8 +13,6 @@ namespace {
 constexpr SmallStepTuning kTuning = kConstraintsTuning.small_steps;
 // What a force may be beyond a bound, and a row open beyond one, for round-off: of the bound, and m or rad.
 constexpr double kRounded = 1e-9;
-// Of energies of motions in single precision.
-constexpr double kSingle = 1e-6;
 
 using Hold = GameRow::Hold;
 
@@ -151,7 +149,7 @@ void GameConstraints::limit_change(std::vector<double>& change) {
     }
   }
   for (Limit& limit : limits_) {
-    const bool within = limit.has <= (1.0 + kSingle) * limit.most;
+    const bool within = limit.has <= (1.0 + kTuning.motion_digits) * limit.most;
     limit.share = within ? 1.0 : std::sqrt(std::max(0.0, limit.most) / limit.has);
     limit.has *= limit.share * limit.share;
   }
