@@ -298,6 +298,9 @@ HWY_ATTR void TurnFrames(const FrameArrays& all, double time) {
 HWY_INLINE HWY_ATTR void FreeTurn(const EightFrames& f, double h, const Wide (*R)[3], const Wide* turn,
                                   std::size_t lane, Wide* free) {
   const Doubles d;
+  for (std::size_t i = 0; i < 3; ++i) free[i] = turn[i];
+  const auto keeps = hn::Gt(Get(f.keeps_axes, lane), hn::Zero(d));
+  if (hn::AllFalse(d, keeps)) return;
   Wide world[3], body[3], start[3], m[3], inverse[3];
   Multiply(f.momentum, true, turn, lane, world);
   Turn(R, true, world, body);
@@ -307,9 +310,8 @@ HWY_INLINE HWY_ATTR void FreeTurn(const EightFrames& f, double h, const Wide (*R
   for (std::size_t i = 0; i < 3; ++i) m[i] = hn::Mul(inverse[i], m[i]);
   Multiply(f.principal, false, m, lane, body);
   Turn(R, false, body, world);
-  Multiply(f.momentum, false, world, lane, free);
-  const auto keeps = hn::Gt(Get(f.keeps_axes, lane), hn::Zero(d));
-  for (std::size_t i = 0; i < 3; ++i) free[i] = hn::IfThenElse(keeps, free[i], turn[i]);
+  Multiply(f.momentum, false, world, lane, body);
+  for (std::size_t i = 0; i < 3; ++i) free[i] = hn::IfThenElse(keeps, body[i], turn[i]);
 }
 
 /// @param told shifts and what R has changed by, a row a number. @param free likewise
@@ -367,12 +369,15 @@ HWY_INLINE HWY_ATTR void EndLanes(EightFrames& f, double h, std::size_t lane, co
     const Wide shift = Get(f.now.shift[i], lane);
     Put(hn::IfThenElse(is_free, hn::MulAdd(length, speed, shift), shift), f.now.shift[i], lane);
   }
-  Multiply(f.turn_scale, true, y, lane, r);
-  Turned(r, turned);
-  for (std::size_t i = 0; i < 4; ++i) before[i] = Get(f.now.attitude[i], lane);
-  Product(turned, before, after);
-  Normalise(after);
+  for (std::size_t i = 0; i < 4; ++i) after[i] = before[i] = Get(f.now.attitude[i], lane);
   const auto turns = hn::Gt(Get(f.turns_axes, lane), hn::Zero(d));
+  if (!hn::AllTrue(d, hn::And(is_free, turns))) {
+    Multiply(f.turn_scale, true, y, lane, r);
+    Turned(r, turned);
+    Product(turned, before, after);
+    Normalise(after);
+    for (std::size_t i = 0; i < 4; ++i) Put(turned[i], f.now.turned[i], lane);
+  }
   if (!hn::AllFalse(d, turns)) {
     Wide turn[3], momentum[3], freely[4];
     for (std::size_t i = 0; i < 3; ++i) turn[i] = Get(f.now.turn[i], lane);
@@ -382,7 +387,6 @@ HWY_INLINE HWY_ATTR void EndLanes(EightFrames& f, double h, std::size_t lane, co
     for (std::size_t i = 0; i < 4; ++i) after[i] = hn::IfThenElse(turns, freely[i], after[i]);
   }
   for (std::size_t i = 0; i < 4; ++i) {
-    Put(turned[i], f.now.turned[i], lane);
     Put(hn::IfThenElse(is_free, after[i], before[i]), f.now.attitude[i], lane);
   }
 }

@@ -426,10 +426,11 @@ void GameBodies::write_motion(std::int32_t number, double* to) const {
 
 void GameBodies::tell(std::int32_t number) {
   const auto at = static_cast<std::size_t>(number);
-  bodies_[at].led < 0 ? show(at) : tell_led(at);
+  if (bodies_[at].led >= 0) return tell_led(at);
+  bodies_[at].group->frame_in_parts(bodies_[at].slot).set_pose(pose_of(at));
 }
 
-/// To its group.
+/// All of its motion, to its group.
 void GameBodies::show(std::size_t at) {
   GameBody& body = bodies_[at];
   const EightFrames& of = frames_[at / kFramesAtOnce];
