@@ -18,33 +18,15 @@ Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowParameter
   return size() - 1;
 }
 
-Index ConstraintRows::add(const RowSide& a, const RowSide& b) {
-  static constexpr RowParameters kLaw;
-  if (size() == static_cast<Index>(rows_.size())) rows_.emplace_back();
-  Row& row = this->row(size_++);
-  row.law = kLaw;
-  const bool itself = a.body >= 0 && a.body == b.body;
-  for (std::size_t s = 0; s < 2; ++s) {
-    const RowSide& from = s == 0 ? a : b;
-    Side& side = row.sides[s];
-    if (from.body < 0 || (itself && s == 1)) {
-      side = {};
-      continue;
-    }
-    side = {from.body, from.linear, from.angular, modal_.size(), from.modal.size()};
-    if (!from.modal.empty()) modal_.insert(modal_.end(), from.modal.begin(), from.modal.end());
-  }
-  if (itself) add_to(row.sides[0], b);
-  return size() - 1;
-}
-
-void ConstraintRows::add_to(Side& side, const RowSide& other) {
-  side.linear += other.linear, side.angular += other.angular;
-  if (side.modal_count < other.modal.size()) {
-    side.modal_count = other.modal.size();
-    modal_.resize(side.modal_begin + side.modal_count, 0.0);
-  }
-  for (std::size_t i = 0; i < other.modal.size(); ++i) modal_[side.modal_begin + i] += other.modal[i];
+/// Those of one body: each has all of its modes, or none.
+void ConstraintRows::join_sides(Row& row) {
+  auto& [a, b] = row.sides;
+  a.linear += b.linear, a.angular += b.angular;
+  if (a.modal_count == 0)
+    a.modal_begin = b.modal_begin, a.modal_count = b.modal_count;
+  else
+    for (std::size_t i = 0; i < b.modal_count; ++i) modal_[a.modal_begin + i] += modal_[b.modal_begin + i];
+  b = {};
 }
 
 void IslandBodies::set(std::span<const ConstrainedBody> table, std::span<const Index> members) {

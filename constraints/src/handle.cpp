@@ -73,9 +73,7 @@ void Handle::add_rows(const BodyStates& states, StepTime when, double step, Cons
       law.holds = true;
       law.prescribed_displacement -= gap;  // the hand takes the point to where it is wanted
     }
-    FrameMeasure velocity;
-    at.add_point(p, n, velocity);
-    rows.add(point_.side(at, velocity, modal_), {}, law);
+    rows.add(point_.side(at, n, modal_), {}, law);
   }
 }
 

@@ -134,23 +134,27 @@ JointConstraint::Instant JointConstraint::instant(const BodyStates& states, Step
   return {.a = a_.at(states, when), .b = b_.at(states, when)};
 }
 
-double JointConstraint::raw_angle(const Instant& at, int i) const {
+/// Of its coordinates, angles within half a turn.
+Vec3 JointConstraint::raw_coordinates(const Instant& at) const {
   const Mat3 Q = at.a.axes.transpose() * at.b.axes;
-  if (spec_.type == JointType::kBall) return euler_xyz(Q)[i];
-  const int x = (axis_of(i) + 1) % 3, y = (axis_of(i) + 2) % 3;
-  return std::atan2(Q(y, x) - Q(x, y), Q(x, x) + Q(y, y));
+  if (spec_.type == JointType::kBall) return euler_xyz(Q);
+  Vec3 raw = Vec3::Zero();
+  for (int i = 0; i < coordinates(); ++i) {
+    const int x = (axis_of(i) + 1) % 3, y = (axis_of(i) + 2) % 3;
+    raw[i] = is_rotation(spec_.type, i) ? std::atan2(Q(y, x) - Q(x, y), Q(x, x) + Q(y, y)) : at.d[axis_of(i)];
+  }
+  return raw;
 }
 
 /// Angles with the number of full turns that is nearest to the last step's.
-double JointConstraint::unwrapped(const Instant& at, int i) const {
-  if (!is_rotation(spec_.type, i)) return at.d[axis_of(i)];
-  const double raw = raw_angle(at, i);
+double JointConstraint::unwrapped(double raw, int i) const {
+  if (!is_rotation(spec_.type, i)) return raw;
   constexpr double kTurn = 2.0 * std::numbers::pi;
   return raw + kTurn * std::round((last_[static_cast<std::size_t>(i)] - raw) / kTurn);
 }
 
 double JointConstraint::coordinate(int i, const BodyStates& states) const {
-  return unwrapped(instant(states, StepTime::kStart), i);
+  return coordinate(instant(states, StepTime::kStart), i);
 }
 
 // Gaps and their derivatives ------------------------------------------------------------------------------------------
@@ -168,7 +172,7 @@ double JointConstraint::measured(const Instant& at, const RowPlan& row) const {
     case Measure::kTranslation:
       return at.d[row.axis];
     case Measure::kScrew:
-      return at.d.x() - spec_.pitch * unwrapped(at, 0);
+      return at.d.x() - spec_.pitch * coordinate(at, 0);
     case Measure::kAcross: {
       const TurnAxes turn = turn_axes(row)[0];
       return turn.sign * at.a.axes.col(turn.of_a).dot(at.b.axes.col(turn.of_b));
@@ -176,7 +180,7 @@ double JointConstraint::measured(const Instant& at, const RowPlan& row) const {
     case Measure::kTurn:
       return 2.0 * quaternion_from_matrix(at.a.axes.transpose() * at.b.axes).vector()[row.axis];
     case Measure::kAngle:
-      return unwrapped(at, row.coordinate);
+      return coordinate(at, row.coordinate);
     case Measure::kCone: {
       const Vec3 x_a = at.a.axes.col(0), x_b = at.b.axes.col(0);
       return std::atan2(x_a.cross(x_b).norm(), x_a.dot(x_b));
@@ -191,16 +195,18 @@ double JointConstraint::gap(const Instant& at, const RowPlan& row) const {
 
 JointConstraint::Direction JointConstraint::direction(const Instant& at, const RowPlan& row) const {
   const Vec3 axis = row.sign * at.a.axes.col(row.axis);
+  const auto across = [&](const TurnAxes& turn) {
+    return Vec3(turn.sign * at.b.axes.col(turn.of_b).cross(at.a.axes.col(turn.of_a)));
+  };
   switch (row.measure) {
     case Measure::kTranslation:
       return {.linear = axis};
     case Measure::kScrew:
       return {.linear = axis, .angular = -spec_.pitch * axis};
-    case Measure::kAcross: {
-      const TurnAxes turn = turn_axes(row)[0];
-      return {.angular = turn.sign * at.b.axes.col(turn.of_b).cross(at.a.axes.col(turn.of_a))};
-    }
+    case Measure::kAcross:
+      return {.angular = across(turn_axes(row)[0])};
     case Measure::kTurn: {
+      if (at.a.when == StepTime::kMiddle) return {.angular = across(turn_axes(row)[0]) + across(turn_axes(row)[1])};
       // d (2 vec q) = w ω + ω × vec q, in the axes of a
       const Quaternion q = normalized(quaternion_from_matrix(at.a.axes.transpose() * at.b.axes));
       return {.angular = at.a.axes * (q.w * Vec3::Unit(row.axis) + q.vector().cross(Vec3::Unit(row.axis)))};
@@ -241,7 +247,7 @@ JointConstraint::Direction JointConstraint::mean_direction(const Instant& start,
   const bool turns = row.measure == Measure::kScrew || row.measure == Measure::kAngle;
   if (!turns || spec_.type == JointType::kBall) return mean;
   const int angle = row.measure == Measure::kScrew ? 0 : row.coordinate;
-  const double half = 0.5 * (unwrapped(end, angle) - unwrapped(start, angle));
+  const double half = 0.5 * (coordinate(end, angle) - coordinate(start, angle));
   const Vec3 axis = start.a.axes.col(row.axis), mean_axis = at.a.axes.col(row.axis);
   const double tangent = std::tan(half), ratio = half == 0.0 ? 1.0 : half / tangent;
   mean.angular *=
@@ -273,32 +279,37 @@ void JointConstraint::write_actuation_law(const RowPlan& plan, double gap, RowPa
   law.offset = gap + law.prescribed_displacement;
 }
 
-/// Of axes and distances: exact for any step, in its middle too. @return whether it is such a row
-bool JointConstraint::measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a,
-                                       FrameMeasure& of_b) const {
-  if (plan.measure == Measure::kAcross || (plan.measure == Measure::kTurn && at.a.when == StepTime::kMiddle)) {
-    for (const auto& [axis_a, axis_b, sign] : turn_axes(plan)) {
-      if (sign == 0.0) continue;
-      at.a.add_axis(axis_a, sign * at.b.axes.col(axis_b), of_a);
-      at.b.add_axis(axis_b, sign * at.a.axes.col(axis_a), of_b);
-    }
-    return true;
+/// All act at b's frame on both parts, opposite.
+Index JointConstraint::add_row(const Instant& at, const RowPlan& plan, const Direction& along, ConstraintRows& rows) {
+  const Vec3 &p = at.b.position, &n = along.linear;
+  RowSide a{a_.body(), -n, n.cross(p - at.a.origin) - along.angular, {}},
+      b{b_.body(), n, (p - at.b.origin).cross(n) + along.angular, {}};
+  if (at.a.bend || at.b.bend) {
+    FrameMeasure of_a, of_b;
+    bend(at, plan, along, of_a, of_b);
+    if (at.a.bend) a_.write_modal(at.a, of_a, modal_a_), a.modal = modal_a_;
+    if (at.b.bend) b_.write_modal(at.b, of_b, modal_b_), b.modal = modal_b_;
   }
-  if (plan.measure != Measure::kTranslation) return false;
-  const Vec3 n = plan.sign * at.a.axes.col(plan.axis);
-  at.b.add_point(at.b.position, n, of_b);
-  at.a.add_axis(plan.axis, plan.sign * (at.b.position - at.a.position), of_a);
-  at.a.add_point(at.a.position, -n, of_a);
-  return true;
+  return rows.add(b, a);
 }
 
-void JointConstraint::measure_along(const Instant& at, const Direction& along, FrameMeasure& of_a, FrameMeasure& of_b) {
-  if (!along.linear.isZero(0.0)) {
-    at.b.add_point(at.b.position, along.linear, of_b);
-    at.a.add_point(at.b.position, -along.linear, of_a);
+/// What modes add. Rows of axes and distances are exact for any step, in its middle too.
+void JointConstraint::bend(const Instant& at, const RowPlan& plan, const Direction& along, FrameMeasure& of_a,
+                           FrameMeasure& of_b) const {
+  const FrameInstant &a = at.a, &b = at.b;
+  if (plan.measure == Measure::kAcross || (plan.measure == Measure::kTurn && a.when == StepTime::kMiddle)) {
+    for (const TurnAxes& turn : turn_axes(plan)) {
+      if (turn.sign == 0.0) continue;
+      if (a.bend) a.bend_axis(turn.of_a, turn.sign * b.axes.col(turn.of_b), of_a);
+      if (b.bend) b.bend_axis(turn.of_b, turn.sign * a.axes.col(turn.of_a), of_b);
+    }
+    return;
   }
-  at.b.add_turn(along.angular, of_b);
-  at.a.add_turn(-along.angular, of_a);
+  if (b.bend) b.bend_point(b.position, along.linear, of_b), b.bend_turn(along.angular, of_b);
+  if (!a.bend) return;
+  if (plan.measure == Measure::kTranslation) a.bend_axis(plan.axis, plan.sign * (b.position - a.position), of_a);
+  a.bend_point(plan.measure == Measure::kTranslation ? a.position : b.position, -along.linear, of_a);
+  a.bend_turn(-along.angular, of_a);
 }
 
 void JointConstraint::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
@@ -315,9 +326,7 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
                place_digits = digits_of(length + from_origin);
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const RowPlan& plan = rows_[i];
-    FrameMeasure of_a, of_b;
-    if (!measure_straight(at, plan, of_a, of_b)) measure_along(at, direction(at, plan), of_a, of_b);
-    RowParameters& law = rows.row(rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_))).law;
+    RowParameters& law = rows.row(add_row(at, plan, direction(at, plan), rows)).law;
     const bool distance = is_distance(plan);
     const double gap = this->gap(at, plan);
     write_law(plan, gap, law);
@@ -331,12 +340,8 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
 void JointConstraint::add_mean_rows(const BodyStates& states, ConstraintRows& rows) {
   const Instant start = instant(states, StepTime::kStart), end = instant(states, StepTime::kEnd),
                 at{.a = a_.between(start.a, end.a), .b = b_.between(start.b, end.b)};
-  for (const RowPlan& plan : rows_) {
-    FrameMeasure of_a, of_b;
-    if (!measure_straight(at, plan, of_a, of_b))
-      measure_along(at, mean_direction(start, end, at, plan, a_.turn(states)), of_a, of_b);
-    rows.add(b_.side(at.b, of_b, modal_b_), a_.side(at.a, of_a, modal_a_));
-  }
+  const Vec3 turn = a_.turn(states);
+  for (const RowPlan& plan : rows_) add_row(at, plan, mean_direction(start, end, at, plan, turn), rows);
 }
 
 void JointConstraint::add_force_derivative(const BodyStates& states, std::span<const double> impulses,
@@ -405,8 +410,7 @@ void JointConstraint::accept(const BodyStates& states, std::span<const double> i
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     const RowPlan& plan = rows_[i];
     const double force = by * impulses[i];
-    if (i < force_.plan.size()) force_.plan[i] = force;
-    if (plan.law >= Law::kMotor) force_.actuation[actuator(plan)] = force;
+    (plan.law < Law::kMotor ? force_.plan[i] : force_.actuation[actuator(plan)]) = force;
     if (plan.coordinate >= 0)
       force_.coordinate[static_cast<std::size_t>(plan.coordinate)] += plan.sign * force;
     else if (plan.measure == Measure::kTranslation)
@@ -414,7 +418,8 @@ void JointConstraint::accept(const BodyStates& states, std::span<const double> i
   }
   if (!ends_step_ && !counts_turns_) return;
   const Instant at = instant(states, StepTime::kStart);  // the state has been taken: the step's end
-  for (int i = 0; i < coordinates(); ++i) last_[static_cast<std::size_t>(i)] = unwrapped(at, i);
+  const Vec3 raw = raw_coordinates(at);
+  for (int i = 0; i < coordinates(); ++i) last_[static_cast<std::size_t>(i)] = unwrapped(raw[i], i);
 }
 
 JointConstraint::Error JointConstraint::error(const BodyStates& states) const {

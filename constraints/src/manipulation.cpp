@@ -69,9 +69,7 @@ Vec3 acceleration(const ConstrainedBody& body, const BodyStates& states, const M
   std::vector<double> modal;
   Vec3 vibrating = Vec3::Zero();  // R U z̈
   for (int axis = 0; axis < 3; ++axis) {
-    FrameMeasure velocity;
-    at.add_point(at.position, Vec3::Unit(axis), velocity);
-    point.side(at, velocity, modal);
+    point.side(at, Vec3::Unit(axis), modal);
     for (std::size_t i = 0; i < modal.size(); ++i) vibrating[axis] += modal[i] * bent[i];
   }
   return group.own_gravity(body.slot, gravity) + group.held_force(body.slot) / c.mass + alpha.cross(arm) +
@@ -139,9 +137,7 @@ class Manipulation {
   void add_row(ConstraintRows& rows, const MaterialFrame& point, const Vec3& direction) {
     const FrameInstant at = point.at(states_, StepTime::kStart);
     scale_ = std::max(scale_, at.position.norm());
-    FrameMeasure velocity;
-    at.add_point(at.position, direction, velocity);
-    rows.add(point.side(at, velocity, modal_), {}, {});
+    rows.add(point.side(at, direction, modal_), {}, {});
   }
 
   Eigen::MatrixXd jacobian(const ConstraintRows& rows) const {

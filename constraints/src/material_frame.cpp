@@ -235,32 +235,26 @@ Vec3 MaterialFrame::turn(const BodyStates& states) const {
   return states.turn(body_) + states.rotation(body_, StepTime::kMiddle) * bent;
 }
 
-FrameInstant MaterialFrame::at(const BodyStates& states, StepTime when) const {
-  // Apart, so that it is made where it is wanted: it is never moved.
-  const auto at_end = [&] {
-    FrameInstant at{.states = states, .when = when, .body = body_, .position = rest_.origin, .axes = rest_.axes};
-    if (body_ < 0) return at;
-    const RigidTransform& pose = states.pose(body_, when);
-    const Mat3 R = to_matrix(pose.q);
-    at.origin = pose.p;
-    if (displacement_.empty()) {
-      at.position = pose.p + R * rest_.origin;
-      at.axes = R * rest_.axes;
-      return at;
-    }
-    const std::span<const double> z = states.amplitudes(body_, when);
-    at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
-    // Named for clang, to which a nested class has no default constructor within the class about it.
-    FrameInstant::Bend& bend = at.bend.emplace(FrameInstant::Bend{.R_BW = R.transpose(), .axes_B = rest_.axes});
-    if (!rotation_.empty()) {
-      bend.turned = turn(z);
-      bend.axes_B = rotation_by(bend.turned) * rest_.axes;
-    }
-    at.axes = R * bend.axes_B;
-    return at;
-  };
-  if (when == StepTime::kMiddle) return between(at(states, StepTime::kStart), at(states, StepTime::kEnd));
-  return at_end();
+/// At one of the step's ends.
+FrameInstant MaterialFrame::at_end(const BodyStates& states, StepTime when) const {
+  const RigidTransform& pose = states.pose(body_, when);
+  const Mat3 R = to_matrix(pose.q);
+  FrameInstant at{.states = states,
+                  .when = when,
+                  .body = body_,
+                  .position = pose.p + R * rest_.origin,
+                  .axes = R * rest_.axes,
+                  .origin = pose.p};
+  if (displacement_.empty()) return at;
+  const std::span<const double> z = states.amplitudes(body_, when);
+  at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
+  // Named for clang, to which a nested class has no default constructor within the class about it.
+  FrameInstant::Bend& bend = at.bend.emplace(FrameInstant::Bend{.R_BW = R.transpose(), .axes_B = rest_.axes});
+  if (rotation_.empty()) return at;
+  bend.turned = turn(z);
+  bend.axes_B = rotation_by(bend.turned) * rest_.axes;
+  at.axes = R * bend.axes_B;
+  return at;
 }
 
 FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstant& end) const {
@@ -290,9 +284,18 @@ void FrameInstant::bend_axis(int axis, const Vec3& u, FrameMeasure& to) const {
   to.turn_B += bend->turning.transpose() * bend->axes_B.col(axis).cross(bend->R_BW * u);
 }
 
-void FrameInstant::add_turn(const Vec3& a, FrameMeasure& to) const {
-  to.angular += a;
-  if (bend) to.turn_B += bend->turning.transpose() * (bend->R_BW * a);
+void FrameInstant::bend_turn(const Vec3& a, FrameMeasure& to) const {
+  to.turn_B += bend->turning.transpose() * (bend->R_BW * a);
+}
+
+RowSide MaterialFrame::side(const FrameInstant& at, const Vec3& n, std::vector<double>& modal) const {
+  RowSide side{body_, n, (at.position - at.origin).cross(n), {}};
+  if (!at.bend) return side;
+  FrameMeasure bent;
+  at.bend_point(at.position, n, bent);
+  write_modal(at, bent, modal);
+  side.modal = modal;
+  return side;
 }
 
 void MaterialFrame::write_modal(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const {

@@ -16,6 +16,14 @@ constexpr double kRounded = 1e-9;
 
 using Hold = GameRow::Hold;
 
+/// Of one block of coordinates.
+Eigen::Map<Eigen::Array<double, 8, 1>> eight(std::vector<double>& from, std::int32_t block) {
+  return Eigen::Map<Eigen::Array<double, 8, 1>>(&from[static_cast<std::size_t>(8 * block)]);
+}
+Eigen::Map<Eigen::Array<float, 8, 1>> eight(std::vector<Block8>& from, std::int32_t block) {
+  return Eigen::Map<Eigen::Array<float, 8, 1>>(from[static_cast<std::size_t>(block)].v);
+}
+
 /// A force within its row's bounds.
 double cut_off(GameRow& row, double force) {
   row.cut = force < row.lower - kRounded * std::abs(row.lower) || force > row.upper + kRounded * std::abs(row.upper);
@@ -118,34 +126,35 @@ void GameConstraints::take(std::vector<Block8>& motion) {
   limits_.assign(system_.components(), {});
   y_.resize(rows_.coordinates());
   for (const RowBody& body : system_.bodies()) {
-    double *at = moved_.data() + 8 * body.first, *y = y_.data() + 8 * body.first;
     double& sum = taken_[static_cast<std::size_t>(body.component)];
-    for (std::int32_t l = 0; l < 8 * body.blocks; ++l) {
-      sum += at[l] * at[l];
-      y[l] = static_cast<double>(motion[static_cast<std::size_t>(body.first + l / 8)].v[l % 8]);
+    for (std::int32_t b = body.first; b < body.first + body.blocks; ++b) {
+      sum += eight(moved_, b).square().sum();
+      eight(y_, b) = eight(motion, b).cast<double>();
     }
-    rows_.unscale(body, at);
+    rows_.unscale(body, moved_.data() + 8 * body.first);
   }
   for (std::size_t i = 0; i < forces_.size(); ++i) forces_[i] = rows_.rows()[i].force;
   limit_change(moved_);
   for (const RowBody& body : system_.bodies())
-    for (std::size_t b = static_cast<std::size_t>(body.first), end = b + static_cast<std::size_t>(body.blocks); b < end;
-         ++b)
-      for (std::size_t l = 0; l < 8; ++l) motion[b].v[l] += static_cast<float>(moved_[8 * b + l]);
+    for (std::int32_t b = body.first; b < body.first + body.blocks; ++b)
+      eight(motion, b) += eight(moved_, b).cast<float>();
 }
 
 /// Of y_, by forces_: leaves as much of y_ + change as has the energy of limits_ and what the targets' rates give. Rows
 /// that meet them give no more, but for the scales of turns.
 void GameConstraints::limit_change(std::vector<double>& change) {
   const std::span<const GameGroup> groups = rows_.groups();
-  for (std::size_t g = 0; g < groups.size(); ++g)
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    double given = 0.0;
     for (std::size_t i = groups[g].first; i < groups[g].first + groups[g].count; ++i)
-      limits_[system_.component(g)].most += 2.0 * forces_[i] * rows_.rows()[i].target;
+      given += forces_[i] * rows_.rows()[i].target;
+    limits_[system_.component(g)].most += 2.0 * given;
+  }
   for (const RowBody& body : system_.bodies()) {
     Limit& limit = limits_[static_cast<std::size_t>(body.component)];
-    for (std::int32_t l = 8 * body.first; l < 8 * (body.first + body.blocks); ++l) {
-      const auto i = static_cast<std::size_t>(l);
-      limit.most += y_[i] * y_[i], limit.has += (y_[i] + change[i]) * (y_[i] + change[i]);
+    for (std::int32_t b = body.first; b < body.first + body.blocks; ++b) {
+      limit.most += eight(y_, b).square().sum();
+      limit.has += (eight(y_, b) + eight(change, b)).square().sum();
     }
   }
   for (Limit& limit : limits_) {
@@ -156,10 +165,8 @@ void GameConstraints::limit_change(std::vector<double>& change) {
   for (const RowBody& body : system_.bodies()) {
     const double share = limits_[static_cast<std::size_t>(body.component)].share;
     if (share == 1.0) continue;
-    for (std::int32_t l = 8 * body.first; l < 8 * (body.first + body.blocks); ++l) {
-      const auto i = static_cast<std::size_t>(l);
-      change[i] = share * (y_[i] + change[i]) - y_[i];
-    }
+    for (std::int32_t b = body.first; b < body.first + body.blocks; ++b)
+      eight(change, b) = share * (eight(y_, b) + eight(change, b)) - eight(y_, b);
   }
 }
 
@@ -168,8 +175,8 @@ void GameConstraints::limit_change(std::vector<double>& change) {
 void GameConstraints::close(const BodyStates& states, GameBodies& bodies, bool pushed) {
   if (rows_.groups().empty()) return;
   for (const RowBody& body : system_.bodies())
-    for (auto b = static_cast<std::size_t>(body.first); b < static_cast<std::size_t>(body.first + body.blocks); ++b)
-      for (std::size_t l = 0; l < 8; ++l) bodies.answers()[b].v[l] -= static_cast<float>(moved_[8 * b + l]);
+    for (std::int32_t b = body.first; b < body.first + body.blocks; ++b)
+      eight(bodies.answers(), b) -= eight(moved_, b).cast<float>();
   if (rows_.any_bounded() &&
       std::ranges::any_of(rows_.rows(), [](const GameRow& row) { return row.gives_way && row.hold == Hold::kMet; }))
     system_.factor(rows_, true);

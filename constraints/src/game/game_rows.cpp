@@ -156,21 +156,18 @@ void GameRows::scale_turns() {
 
 void GameRows::write_row(const GameBodies& bodies, const GameGroup& group, std::size_t i) {
   const RowParameters& law = made_.row(static_cast<Index>(i)).law;
-  const double h = length_;
+  const double h = length_, per = 1.0 / h;
   GameRow& row = rows_[group.first + i];
-  row.lower = law.lower / h, row.upper = law.upper / h;
+  row.lower = per * law.lower, row.upper = per * law.upper;
   row.target = row.rate = h * law.end_rate;
   row.compliance = h * law.compliance;
-  for (const GameSide& side : group.sides) {
-    const double* numbers = this->numbers(side, static_cast<std::int32_t>(i));
-    for (std::int32_t b = 1; b < side.coordinates / 8; ++b)
-      for (int l = 0; l < 8; ++l)
-        row.target +=
-            numbers[8 * b + l] * static_cast<double>(bodies.shapes()[static_cast<std::size_t>(side.body + b)].v[l]);
-  }
-  const bool from_below = law.lower == 0.0, from_above = law.upper == 0.0,
-             gives_way = row.is_bounded() && !from_below && !from_above;
-  any_bounded_ = any_bounded_ || row.is_bounded();
+  for (const GameSide& side : group.sides)
+    for (std::int32_t k = 8; k < side.coordinates; ++k)
+      row.target += numbers(side, static_cast<std::int32_t>(i))[k] *
+                    static_cast<double>(bodies.shapes()[static_cast<std::size_t>(side.body + k / 8)].v[k % 8]);
+  const bool bounded = row.is_bounded(), from_below = law.lower == 0.0, from_above = law.upper == 0.0,
+             gives_way = bounded && !from_below && !from_above;
+  any_bounded_ = any_bounded_ || bounded;
   row.keeps_place = !law.goes_on && !gives_way && row.compliance == 0.0;
   row.gives_way = !law.goes_on && gives_way && row.compliance == 0.0;
   row.error = 0.0;

@@ -117,7 +117,16 @@ class ConstraintRows {
   /// @return the row's index. Copies the modal parts. Two sides of one body become one, their sum.
   Index add(const RowSide& a, const RowSide& b, const RowParameters& law);
   /// The same with the law that a row has by itself, for whoever writes it in its place.
-  Index add(const RowSide& a, const RowSide& b);
+  Index add(const RowSide& a, const RowSide& b) {
+    static const RowParameters kLaw;  // copied in a few instructions, as a new one is not
+    if (size_ == static_cast<Index>(rows_.size())) rows_.emplace_back();
+    Row& row = this->row(size_++);
+    row.law = kLaw;
+    write(a, row.sides[0]);
+    write(b, row.sides[1]);
+    if (a.body >= 0 && a.body == b.body) join_sides(row);
+    return size_ - 1;
+  }
   /// Pairs (i, j) as (i, j) or (j, i), i = j too; what is given for one pair adds up. For rows with bounds. All values
   /// of a body together are a positive semidefinite matrix, of rows that act on it.
   void add_flexibility(Index body, Index i, Index j, double value) { flexibility_.push_back({i, j, value, body}); }
@@ -134,7 +143,12 @@ class ConstraintRows {
   double stored_energy() const { return stored_energy_; }
 
  private:
-  void add_to(Side& side, const RowSide& other);
+  void write(const RowSide& from, Side& to) {
+    if (from.body < 0) return void(to = {});
+    to = {from.body, from.linear, from.angular, modal_.size(), from.modal.size()};
+    if (!from.modal.empty()) modal_.insert(modal_.end(), from.modal.begin(), from.modal.end());
+  }
+  void join_sides(Row& row);
 
   std::vector<Row> rows_;  // the first size_, and others for later
   Index size_ = 0;

@@ -106,8 +106,9 @@ class JointConstraint final : public Constraint {
 
   std::array<TurnAxes, 2> turn_axes(const RowPlan& row) const;
   Instant instant(const BodyStates& states, StepTime when) const;
-  double raw_angle(const Instant& at, int i) const;
-  double unwrapped(const Instant& at, int i) const;
+  Vec3 raw_coordinates(const Instant& at) const;
+  double unwrapped(double raw, int i) const;
+  double coordinate(const Instant& at, int i) const { return unwrapped(raw_coordinates(at)[i], i); }
   double measured(const Instant& at, const RowPlan& row) const;
   double gap(const Instant& at, const RowPlan& row) const;
   Direction direction(const Instant& at, const RowPlan& row) const;
@@ -128,8 +129,9 @@ class JointConstraint final : public Constraint {
   void plan_limits();
   void plan_actuation();
   void add_mean_rows(const BodyStates& states, ConstraintRows& rows);
-  bool measure_straight(const Instant& at, const RowPlan& plan, FrameMeasure& of_a, FrameMeasure& of_b) const;
-  static void measure_along(const Instant& at, const Direction& along, FrameMeasure& of_a, FrameMeasure& of_b);
+  Index add_row(const Instant& at, const RowPlan& plan, const Direction& along, ConstraintRows& rows);
+  void bend(const Instant& at, const RowPlan& plan, const Direction& along, FrameMeasure& of_a,
+            FrameMeasure& of_b) const;
   void write_law(const RowPlan& plan, double gap, RowParameters& law) const;
   void write_actuation_law(const RowPlan& plan, double gap, RowParameters& law) const;
 

@@ -25,10 +25,9 @@
 
 namespace limber {
 
-/// What one side of a row measures of a frame's motion. Parts add up.
+/// What one side of a row measures of how modes move a frame, body axes. Parts add up.
 struct FrameMeasure {
-  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();  ///< of the body, world, as in RowSide
-  Vec3 shift_B = Vec3::Zero(), turn_B = Vec3::Zero();  ///< of the frame's origin by D ż, of its axes by Θ ż
+  Vec3 shift_B = Vec3::Zero(), turn_B = Vec3::Zero();  ///< of its origin by D ż, of its axes by Θ ż
 };
 
 /// A frame at one time of a step. In the middle of it axes are the mean of both ends, not orthonormal.
@@ -49,26 +48,16 @@ struct FrameInstant {
   Vec3 origin = Vec3::Zero();    ///< of the body, world, m
   std::optional<Bend> bend{};
 
-  /// Before add_axis() and add_turn(), at one of the step's ends.
+  /// Before bend_axis() and bend_turn(), at one of the step's ends.
   void find_turning();
-  /// Adds the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
+  // What modes add. @pre bend
+  /// To the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
   /// @param p, n world
-  void add_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
-    to.linear += n;
-    to.angular += (p - origin).cross(n);
-    if (bend) bend_point(p, n, to);
-  }
-  /// Adds what u · (an axis of the frame) changes by, u held: axis × u · its turn. @param axis 0 to 2. @param u world
-  void add_axis(int axis, const Vec3& u, FrameMeasure& to) const {
-    to.angular += axes.col(axis).cross(u);
-    if (bend) bend_axis(axis, u, to);
-  }
-  /// Adds the angular velocity along a. @param a world
-  void add_turn(const Vec3& a, FrameMeasure& to) const;
-
- private:
   void bend_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const;
+  /// To what u · (an axis of the frame) changes by, u held. @param axis 0 to 2. @param u world
   void bend_axis(int axis, const Vec3& u, FrameMeasure& to) const;
+  /// To the angular velocity along a. @param a world
+  void bend_turn(const Vec3& a, FrameMeasure& to) const;
 };
 
 class MaterialFrame {
@@ -97,16 +86,17 @@ class MaterialFrame {
   Vec3 turn(const BodyStates& states) const;
 
   /// The frame at one time of a step, with what all rows about it share.
-  FrameInstant at(const BodyStates& states, StepTime when) const;
+  FrameInstant at(const BodyStates& states, StepTime when) const {
+    return when == StepTime::kMiddle ? between(at_end(states, StepTime::kStart), at_end(states, StepTime::kEnd))
+                                     : at_end(states, when);
+  }
   /// The middle, from both ends.
   FrameInstant between(const FrameInstant& start, const FrameInstant& end) const;
-  /// One side of a row. @param modal room for k numbers; the result refers to it
-  RowSide side(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const {
-    if (body_ < 0) return {};
-    if (displacement_.empty()) return {body_, measure.linear, measure.angular, {}};
-    write_modal(at, measure, modal);
-    return {body_, measure.linear, measure.angular, modal};
-  }
+  /// Of a row that measures the velocity of the frame's origin along n, world. @param modal room for k numbers; the
+  /// result refers to it
+  RowSide side(const FrameInstant& at, const Vec3& n, std::vector<double>& modal) const;
+  /// What modes show of a row. @param modal likewise. @pre at.bend
+  void write_modal(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const;
 
  private:
   friend struct StateFields;
@@ -128,10 +118,10 @@ class MaterialFrame {
     std::vector<Vec3> shapes{};  // one per mode
   };
 
+  FrameInstant at_end(const BodyStates& states, StepTime when) const;
   Vec3 turn(std::span<const double> z) const;      // Θ z
   Vec3 displace(std::span<const double> z) const;  // D z
   Vec3 place(const BodyShape& shape) const;
-  void write_modal(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const;
   void add_rows(const BodyShape& shape, const Vec3& f_B, std::span<double> g) const;
   void add_rows(const BodyStates& states, StepTime when, const Vec3& f_B, std::span<double> g) const;
 
