@@ -79,8 +79,14 @@ def _point(at: Union[int, Point]) -> tuple[int, int, Sequence[float]]:
     return word("LIMBER_SURFACE_", p.surface), p.triangle, list(p.weights)
 
 
+_EVERY_BODY = ffi.NULL, None
+"""What World._filter gives where nobody is left out"""
+
 _HIT = struct.Struct("@2I?0dIi3d48x2d")
 """limber_hit without position, normal and user_data"""
+
+_make = tuple.__new__
+"""Of a NamedTuple from all its members: half the time of its own constructor"""
 
 
 def _key(id: Any) -> tuple[int, int]:
@@ -639,25 +645,22 @@ class World:
     def cast_ray(self, origin: Sequence[float], way: Sequence[float], mask: int = ALL_LAYERS,
                  ignore: Iterable[Body] = ()) -> Optional[Hit]:
         """The first place that a ray from `origin` along `way` (m, as long as the ray) meets. `mask`: layers that may answer."""
-        filter, _accepts = self._filter(mask, ignore)
-        check(lib.limber_world_cast_ray(self._pointer, vector(origin), vector(way), filter, self._found.pointer, self._hit.pointer))
-        return self._first()
+        filter, _accepts = self._filter(mask, ignore) if ignore or mask != ALL_LAYERS else _EVERY_BODY
+        return self._first(lib.limber_world_cast_ray(self._pointer, vector(origin), vector(way), filter, self._found.pointer, self._hit.pointer))
 
     def cast_shape(self, shape: Shape, position: Sequence[float], way: Sequence[float],
                    rotation: Sequence[float] = (1, 0, 0, 0), mask: int = ALL_LAYERS,
                    ignore: Iterable[Body] = ()) -> Optional[Hit]:
         """Where a sphere, capsule, box or hull first touches that is moved along `way` without turning."""
         filter, _accepts = self._filter(mask, ignore)
-        check(lib.limber_world_cast_shape(self._pointer, shape._pointer, transform(position, rotation), vector(way), filter,
-                                          self._found.pointer, self._hit.pointer))
-        return self._first()
+        return self._first(lib.limber_world_cast_shape(self._pointer, shape._pointer, transform(position, rotation), vector(way), filter,
+                                                       self._found.pointer, self._hit.pointer))
 
     def nearest_point(self, point: Sequence[float], max_distance: float, mask: int = ALL_LAYERS,
                       ignore: Iterable[Body] = ()) -> Optional[Hit]:
         """The nearest place of any surface, no farther than `max_distance`, m."""
         filter, _accepts = self._filter(mask, ignore)
-        check(lib.limber_world_nearest_point(self._pointer, vector(point), max_distance, filter, self._found.pointer, self._hit.pointer))
-        return self._first()
+        return self._first(lib.limber_world_nearest_point(self._pointer, vector(point), max_distance, filter, self._found.pointer, self._hit.pointer))
 
     def find_overlaps(self, shape: Shape, position: Sequence[float], rotation: Sequence[float] = (1, 0, 0, 0),
                       mask: int = ALL_LAYERS, ignore: Iterable[Body] = ()) -> list[Body]:
@@ -668,7 +671,7 @@ class World:
 
     def _filter(self, mask: int, ignore: Iterable[Body]) -> tuple[Any, Any]:
         if not ignore and mask == ALL_LAYERS:
-            return ffi.NULL, None
+            return _EVERY_BODY
         ignored = {body.index for body in ignore}
         filter = ffi.new("limber_query_filter*", lib.limber_default_query_filter())
         filter.mask = mask
@@ -678,12 +681,16 @@ class World:
         filter.accepts = accepts
         return filter, accepts  # the second is kept as long as the first is used
 
-    def _first(self) -> Optional[Hit]:
+    def _first(self, result: int) -> Optional[Hit]:
+        """What a query that ended with `result` has found."""
+        if result:
+            check(result)
         if not self._found.pointer[0]:
             return None
-        index, generation, has_point, surface, triangle, a, b, c, fraction, distance = _HIT.unpack_from(self._hit.memory)
-        point = Point(triangle, (a, b, c), _SURFACES[surface]) if has_point else None
-        return Hit(Body(self, (index, generation)), point, self._hit.copy["position"](), self._hit.copy["normal"](), fraction, distance)
+        hit = self._hit
+        index, generation, has_point, surface, triangle, a, b, c, fraction, distance = _HIT.unpack_from(hit.memory)
+        point = _make(Point, (triangle, (a, b, c), _SURFACES[surface])) if has_point else None
+        return _make(Hit, (Body(self, (index, generation)), point, hit.copy["position"](), hit.copy["normal"](), fraction, distance))
 
     # Rollback
 
