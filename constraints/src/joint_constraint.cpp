@@ -153,10 +153,6 @@ double JointConstraint::unwrapped(double raw, int i) const {
   return raw + kTurn * std::round((last_[static_cast<std::size_t>(i)] - raw) / kTurn);
 }
 
-double JointConstraint::coordinate(int i, const BodyStates& states) const {
-  return coordinate(instant(states, StepTime::kStart), i);
-}
-
 // Gaps and their derivatives ------------------------------------------------------------------------------------------
 
 /// What is across: an axis of b and that of a it is to be normal to, with the sign that makes the row a rotation. And
@@ -187,10 +183,6 @@ double JointConstraint::measured(const Instant& at, const RowPlan& row) const {
     }
   }
   return 0.0;
-}
-
-double JointConstraint::gap(const Instant& at, const RowPlan& row) const {
-  return row.sign * (measured(at, row) - row.zero);
 }
 
 JointConstraint::Direction JointConstraint::direction(const Instant& at, const RowPlan& row) const {

@@ -78,18 +78,17 @@ Vec3 times(const std::vector<Vec3>& shapes, std::span<const double> z) {
   return {u, v, w};
 }
 
-/// By its vector r: cos ½|r| and the factor of r in the vector part of its quaternion, sin(½|r|)/|r|.
-struct HalfTurn {
-  explicit HalfTurn(const Vec3& r)
-      : angle(r.norm()), cosine(std::cos(0.5 * angle)), factor(angle > 0.0 ? std::sin(0.5 * angle) / angle : 0.5) {}
-  double angle, cosine, factor;
-};
+HalfTurn half_of(const Vec3& r) {
+  const double angle = r.norm();
+  return {angle, std::cos(0.5 * angle), angle > 0.0 ? std::sin(0.5 * angle) / angle : 0.5};
+}
 
 /// exp([r]ₓ) by Rodrigues.
-Mat3 rotation_by(const Vec3& r) {
-  const HalfTurn half(r);
-  const Mat3 K = cross_matrix(r);
-  return Mat3::Identity() + 2.0 * half.factor * (half.cosine * K + half.factor * K * K);
+Mat3 rotation_by(const Vec3& r, const HalfTurn& half) {
+  const Vec3 across = 2.0 * half.factor * half.factor * r;
+  Mat3 R = across * r.transpose() + cross_matrix(2.0 * half.factor * half.cosine * r);
+  R.diagonal().array() += 1.0 - across.dot(r);
+  return R;
 }
 
 /// (sinc √v − sinc √u)/(u − v), u = ¼(|a| + |b|)², v = ¼(|a| − |b|)²: by its series where turns are small, else by that
@@ -113,9 +112,9 @@ double sinc_slope(const HalfTurn& a, const HalfTurn& b) {
 /// G of the Cayley vector G (b − a) of exp([b]ₓ) exp(−[a]ₓ), which is what exp turns by per unit of its vector where
 /// both meet. With m = ½(a + b), halves' c = cos and s = the factor, and e = sinc_slope() the vector part of the
 /// quaternion is ½(c_a s_b + c_b s_a)(b − a) + s_a s_b m × (b − a) + ½ e m m·(b − a).
-Mat3 turning_between(const Vec3& a, const Vec3& b) {
-  const HalfTurn from(a), to(b);
-  const Vec3 m = 0.5 * (a + b);
+Mat3 turning_between(const FrameInstant::Bend& start, const FrameInstant::Bend& end) {
+  const HalfTurn &from = start.half, &to = end.half;
+  const Vec3 &a = start.turned, &b = end.turned, m = 0.5 * (a + b);
   const double both = from.factor * to.factor, w = from.cosine * to.cosine + both * a.dot(b);
   return ((from.cosine * to.factor + to.cosine * from.factor) * Mat3::Identity() + 2.0 * both * cross_matrix(m) +
           sinc_slope(from, to) * m * m.transpose()) /
@@ -251,8 +250,8 @@ FrameInstant MaterialFrame::at_end(const BodyStates& states, StepTime when) cons
   // Named for clang, to which a nested class has no default constructor within the class about it.
   FrameInstant::Bend& bend = at.bend.emplace(FrameInstant::Bend{.R_BW = R.transpose(), .axes_B = rest_.axes});
   if (rotation_.empty()) return at;
-  bend.turned = turn(z);
-  bend.axes_B = rotation_by(bend.turned) * rest_.axes;
+  bend.turned = turn(z), bend.half = half_of(bend.turned);
+  bend.axes_B = rotation_by(bend.turned, bend.half) * rest_.axes;
   at.axes = R * bend.axes_B;
   return at;
 }
@@ -267,12 +266,12 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
   if (!start.bend) return at;
   const Mat3 R_BW = start.bend->R_BW - 0.5 * start.bend->R_BW * cross_matrix(at.states.turn(body_));
   at.bend.emplace(FrameInstant::Bend{.R_BW = R_BW, .axes_B = 0.5 * (start.bend->axes_B + end.bend->axes_B)});
-  if (!rotation_.empty()) at.bend->turning = turning_between(start.bend->turned, end.bend->turned);
+  if (!rotation_.empty()) at.bend->turning = turning_between(*start.bend, *end.bend);
   return at;
 }
 
 void FrameInstant::find_turning() {
-  if (bend) bend->turning = turning_between(bend->turned, bend->turned);
+  if (bend) bend->turning = turning_between(*bend, *bend);
 }
 
 void FrameInstant::bend_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {

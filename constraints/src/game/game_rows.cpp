@@ -162,9 +162,11 @@ void GameRows::write_row(const GameBodies& bodies, const GameGroup& group, std::
   row.target = row.rate = h * law.end_rate;
   row.compliance = h * law.compliance;
   for (const GameSide& side : group.sides)
-    for (std::int32_t k = 8; k < side.coordinates; ++k)
-      row.target += numbers(side, static_cast<std::int32_t>(i))[k] *
-                    static_cast<double>(bodies.shapes()[static_cast<std::size_t>(side.body + k / 8)].v[k % 8]);
+    for (std::int32_t k = 8; k < side.coordinates; k += 8) {
+      const Block8& shape = bodies.shapes()[static_cast<std::size_t>(side.body + k / 8)];
+      row.target += block<8>(numbers(side, static_cast<std::int32_t>(i)) + k)
+                        .dot(Eigen::Map<const Eigen::Matrix<float, 8, 1>>(shape.v).cast<double>());
+    }
   const bool bounded = row.is_bounded(), from_below = law.lower == 0.0, from_above = law.upper == 0.0,
              gives_way = bounded && !from_below && !from_above;
   any_bounded_ = any_bounded_ || bounded;

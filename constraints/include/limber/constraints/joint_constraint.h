@@ -38,7 +38,7 @@ class JointConstraint final : public Constraint {
   const JointActuation& actuation(int coordinate) const { return actuation_[static_cast<std::size_t>(coordinate)]; }
 
   /// q at the end of the last step, angles with their full turns.
-  double coordinate(int i, const BodyStates& states) const;
+  double coordinate(int i, const BodyStates& states) const { return coordinate(instant(states, StepTime::kStart), i); }
   /// Force along the coordinate over the last step: limit, motor, drive and friction together, N or N·m.
   double coordinate_force(int i) const { return force_.coordinate[static_cast<std::size_t>(i)]; }
   /// Force of the locked translations on b over the last step, world, N.
@@ -110,7 +110,7 @@ class JointConstraint final : public Constraint {
   double unwrapped(double raw, int i) const;
   double coordinate(const Instant& at, int i) const { return unwrapped(raw_coordinates(at)[i], i); }
   double measured(const Instant& at, const RowPlan& row) const;
-  double gap(const Instant& at, const RowPlan& row) const;
+  double gap(const Instant& at, const RowPlan& row) const { return row.sign * (measured(at, row) - row.zero); }
   Direction direction(const Instant& at, const RowPlan& row) const;
   Vec3 direction_change(const Instant& at, const RowPlan& row, const Mat3& dR_a, const Mat3& dR_b) const;
   Direction mean_direction(const Instant& start, const Instant& end, const Instant& at, const RowPlan& row,

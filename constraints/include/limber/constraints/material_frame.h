@@ -30,6 +30,11 @@ struct FrameMeasure {
   Vec3 shift_B = Vec3::Zero(), turn_B = Vec3::Zero();  ///< of its origin by D ż, of its axes by Θ ż
 };
 
+/// By a turn's vector r: |r|, cos ½|r| and the factor of r in the vector part of its quaternion, sin(½|r|)/|r|.
+struct HalfTurn {
+  double angle = 0.0, cosine = 1.0, factor = 0.5;
+};
+
 /// A frame at one time of a step. In the middle of it axes are the mean of both ends, not orthonormal.
 struct FrameInstant {
   /// What counts where modes show, in body axes.
@@ -39,6 +44,7 @@ struct FrameInstant {
     /// middle the Cayley vector of all of it, of Θ Δz.
     Mat3 turning = Mat3::Identity();
     Vec3 turned = Vec3::Zero();  ///< Θ z, at the step's ends
+    HalfTurn half{};             ///< of it
   };
   BodyStates states;
   StepTime when = StepTime::kStart;
