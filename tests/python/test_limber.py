@@ -313,3 +313,12 @@ def test_joints_are_found_by_the_program(tmp_path):
     known = json.loads((tmp_path / "door.joints.json").read_text())
     found = limber.find_joints(tmp_path / "door.obj", components="groups")
     assert sorted(joint["type"] for joint in found["joints"]) == sorted(joint["type"] for joint in known["joints"])
+
+
+@needs("limber-view")
+def test_an_asset_becomes_a_page(tmp_path):
+    limber.soft_ball(0.3, 6, "jelly", 4, 0.02).write(tmp_path / "ball.glb")
+    page = limber.view(tmp_path / "ball.glb", tmp_path / "ball.html")
+    assert page == tmp_path / "ball.html" and '{"path":"/scene/asset.glb","packed":"' in page.read_text()
+    with pytest.raises(limber.InputError, match="none.glb"):
+        limber.view(tmp_path / "none.glb", page)
