@@ -308,10 +308,7 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
   if (when == StepTime::kMiddle) return add_mean_rows(states, rows);
   Instant at = instant(states, when);
   at.a.find_turning(), at.b.find_turning();
-  if (when == StepTime::kStart) {
-    step_ = step;
-    axes_at_start_ = at.a.axes;
-  }
+  if (when == StepTime::kStart) step_ = step, axes_at_start_ = at.a.axes;
   const auto arm = [&](const FrameInstant& part) { return part.body < 0 ? 0.0 : (at.b.position - part.origin).norm(); };
   const double length = std::max(arm(at.a), arm(at.b)), from_origin = at.b.position.norm(),
                nearest = internal::kConstraintsTuning.rows.joint_tolerance * length + digits_of(from_origin),
@@ -394,9 +391,7 @@ void JointConstraint::gaps(const BodyStates& states, StepTime when, std::span<do
 }
 
 void JointConstraint::accept(const BodyStates& states, std::span<const double> impulses) {
-  force_.locked = Vec3::Zero();
-  force_.coordinate = {};
-  force_.actuation = {};
+  force_.locked = Vec3::Zero(), force_.coordinate = {}, force_.actuation = {};
   force_.plan.resize(plan_.size());
   const double by = 1.0 / step_;
   for (std::size_t i = 0; i < impulses.size(); ++i) {

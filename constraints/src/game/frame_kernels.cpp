@@ -180,6 +180,7 @@ HWY_INLINE HWY_ATTR void MiddleMomentum(const Wide* inverse, Wide a, const Wide*
       m[i] = hn::NegMulAdd(by, sum, m[i]);
       length = hn::MulAdd(m[i], m[i], length);
     }
+    if (hn::AllTrue(d, hn::Le(length, square))) continue;
     const Wide within = hn::Sqrt(hn::Min(one, hn::Div(square, hn::Max(length, least))));
     for (std::size_t i = 0; i < 3; ++i) m[i] = hn::Mul(within, m[i]);
   }
@@ -254,11 +255,17 @@ HWY_INLINE HWY_ATTR void TurnFreely(const EightFrames& f, const Wide* momentum, 
   Rotation(to, R);
   Turn(R, true, momentum, body);
   Multiply(f.principal, true, body, lane, end);
+  Wide now = hn::Zero(d);
+  for (std::size_t i = 0; i < 3; ++i) now = hn::MulAdd(hn::Mul(inverse[i], end[i]), end[i], now);
+  const auto gains = hn::Gt(now, hn::Mul(hn::Set(d, 1.0 + kTurns.turn_digits), twice));
+  for (std::size_t i = 0; i < 4; ++i) q[i] = to[i];
+  if (hn::AllFalse(d, gains)) return;
   LoseEnergy(inverse, end, twice, by);
-  const Wide vector[3] = {hn::Neg(by[1]), hn::Neg(by[2]), hn::Neg(by[3])};
-  Multiply(f.principal, false, vector, lane, by + 1);
-  Product(to, by, q);
-  Normalise(q);
+  for (std::size_t i = 0; i < 3; ++i) end[i] = hn::Neg(by[1 + i]);
+  Multiply(f.principal, false, end, lane, by + 1);
+  Product(q, by, to);
+  Normalise(to);
+  for (std::size_t i = 0; i < 4; ++i) q[i] = hn::IfThenElse(gains, to[i], q[i]);
 }
 
 HWY_INLINE HWY_ATTR void TurnLanes(EightFrames& f, double time, std::size_t lane) {
@@ -386,9 +393,7 @@ HWY_INLINE HWY_ATTR void EndLanes(EightFrames& f, double h, std::size_t lane, co
     TurnFreely(f, momentum, length, lane, freely);
     for (std::size_t i = 0; i < 4; ++i) after[i] = hn::IfThenElse(turns, freely[i], after[i]);
   }
-  for (std::size_t i = 0; i < 4; ++i) {
-    Put(hn::IfThenElse(is_free, after[i], before[i]), f.now.attitude[i], lane);
-  }
+  for (std::size_t i = 0; i < 4; ++i) Put(hn::IfThenElse(is_free, after[i], before[i]), f.now.attitude[i], lane);
 }
 
 HWY_ATTR void EndFrames(const FrameArrays& all, bool pushed) {
