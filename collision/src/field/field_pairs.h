@@ -25,15 +25,16 @@ class FieldPairs {
   bool takes(Index a, Index b) const;
   /// Appends; many threads may call it at once, each with scratch of its own. @pre query.by_fields
   void find(const PairQuery& query, FieldContacts& scratch, std::vector<FeatureContact>& found) const;
-  /// Whether it has a body's coordinates, and then: what holds its surface, how far modes are expected to move any
-  /// point of it, m, and where a point of it is; body frame.
+  /// Whether it has a body's coordinates, and then: what holds its surface, and where a point of it is; body frame.
   bool has(Index body) const { return entries_[static_cast<std::size_t>(body)].shell.has_value(); }
   Aabb bounds(Index body) const {
     const DeformedPointshell& shell = *entries_[static_cast<std::size_t>(body)].shell;
     return {shell.low().cast<double>(), shell.high().cast<double>()};
   }
+  /// How far modes are expected to move any point of a body, m.
   double largest_swing(Index body) const {
-    return static_cast<double>(entries_[static_cast<std::size_t>(body)].shell->largest_swing());
+    const auto& shell = entries_[static_cast<std::size_t>(body)].shell;
+    return shell ? static_cast<double>(shell->largest_swing()) : 0.0;
   }
   Vec3 place(Index body, const FeatureSide& side) const;
   /// What the expected motion and a fall close of a contact's gap, m. @param points, normal in the frames of a, b and a

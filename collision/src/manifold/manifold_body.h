@@ -52,7 +52,6 @@ struct ManifoldBody {
   Mat3 turn = Mat3::Identity();
   Vec3 displacement = Vec3::Zero();
   double reach = 0.0;
-  double bends = 0.0;  ///< how far modes are expected to move any point, each by itself, m; of distance fields
 
   Index modes() const { return modal ? modal->surface->modes() : 0; }
   const ConvexCore* core() const { return rigid && !rigid->core.points.empty() ? &rigid->core : nullptr; }

@@ -51,11 +51,9 @@ void ManifoldFinder::Impl::make_boxes(Jobs& jobs) {
                         ManifoldBody& body = at(placing.bodies[i]);
                         const BodyState& s = state(placing.bodies[i]);
                         if (body.half_space() != nullptr) continue;
-                        if (body.modal) {
+                        if (body.modal)
                           internal::bind_state("ManifoldFinder", placing.bodies[i], (*worker).root, body.modal->surface,
                                                s.amplitudes);
-                          body.bends = expected_bends(body, s);
-                        }
                         Aabb& box = placing.boxes[i];
                         if (body.modal && fields.has(placing.bodies[i]) && std::isfinite(s.doubt)) {
                           box = swept_box(placing.bodies[i]);

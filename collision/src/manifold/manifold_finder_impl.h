@@ -90,7 +90,6 @@ struct ManifoldFinder::Impl {
     return (at(pair.a).modal || at(pair.b).modal) && fields.takes(pair.a, pair.b);
   }
   internal::PairQuery query_of(const BodyPair& pair) const;
-  static double expected_bends(const internal::ManifoldBody& body, const BodyState& state);
   void find_manifolds(Jobs& jobs);
   bool keeps(const internal::LivePair& pair, const internal::PairQuery& query) const;
   static double way(const internal::PairQuery& query, const RigidTransform& from, const RigidTransform& to);

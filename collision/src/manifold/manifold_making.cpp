@@ -87,14 +87,6 @@ bool ManifoldFinder::Impl::lasts(const PairQuery& q) const {
   return !q.by_fields || 2.0 * comes(q) <= slack(q);  // as it comes and, made then, as it comes further
 }
 
-double ManifoldFinder::Impl::expected_bends(const ManifoldBody& body, const BodyState& state) {
-  double bends = 0.0;
-  for (std::size_t i = 0; i < state.amplitudes.size() && std::isfinite(state.doubt); ++i)
-    bends += std::abs(state.end_amplitudes[i] - state.amplitudes[i]) *
-             body.modal->surface->largest_shape(static_cast<Index>(i));
-  return bends;
-}
-
 /// How far points of one body come against the other as the smaller one moves in the frame of the larger.
 double ManifoldFinder::Impl::way(const PairQuery& q, const RigidTransform& from, const RigidTransform& to) {
   return (to.p - from.p).norm() + 2.0 * (to.q * from.q.conjugate()).vector().norm() * std::min(q.a.radius, q.b.radius);
@@ -102,7 +94,7 @@ double ManifoldFinder::Impl::way(const PairQuery& q, const RigidTransform& from,
 
 /// How far they are expected to, modes included.
 double ManifoldFinder::Impl::comes(const PairQuery& q) const {
-  return way(q, q.X_LS, q.expected.X_LS_end) + q.a.bends + q.b.bends;
+  return way(q, q.X_LS, q.expected.X_LS_end) + fields.largest_swing(q.index_a) + fields.largest_swing(q.index_b);
 }
 
 namespace {
