@@ -10,6 +10,7 @@ namespace limber {
 namespace {
 
 using namespace samples;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 /// The unit cube, its faces, weights of 1 on joint 0, an inverse bind matrix, and a morph target that moves all by 1
@@ -105,6 +106,11 @@ TEST_F(Gltf, NamesOfBuffersMayBeWrittenWithPerCent) {
       read(gltf(kOneNode, "[0]", 0, "", "", "my%20mesh%20%C3%BC.bin"), 1.0, 0.0, "my mesh \xc3\xbc.bin");
   EXPECT_NEAR(enclosed_volume(s), 1.0, 1e-6);
   EXPECT_NEAR(enclosed_volume(read(gltf(kOneNode, "[0]", 0, "", "", "100%.bin"), 1.0, 0.0, "100%.bin")), 1.0, 1e-6);
+}
+
+TEST_F(Gltf, AMissingBufferIsToldWithTheFileThatNamesIt) {
+  EXPECT_THAT(complaint(gltf(kOneNode, "[0]", 0, "", "", "nowhere.bin")),
+              AllOf(HasSubstr("a.gltf\" buffers[0].uri: "), HasSubstr("nowhere.bin\": No such file")));
 }
 
 TEST_F(Gltf, WhatIsNotReadIsRefusedByName) {

@@ -200,7 +200,11 @@ std::string GltfFile::read_buffer(const JsonObject& buffer, std::size_t i) const
     throw InputError(buffer.where("uri") + ": is " + in_quotes(uri) + ", expected the name of a file");
   const std::filesystem::path folder = path_.parent_path();
   std::error_code ignored;
-  return read_file(std::filesystem::exists(folder / uri, ignored) ? folder / uri : folder / without_per_cent(uri));
+  try {
+    return read_file(std::filesystem::exists(folder / uri, ignored) ? folder / uri : folder / without_per_cent(uri));
+  } catch (const InputError& e) {
+    throw InputError(buffer.where("uri") + ": " + e.what());
+  }
 }
 
 const std::string& GltfFile::buffer(std::size_t i) {

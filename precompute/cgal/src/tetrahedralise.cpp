@@ -207,20 +207,29 @@ void append(const TetMesh& body, TetMesh& mesh) {
   }
 }
 
-/// Fills one body and adds its tets to the whole.
+/// What to try where a mesh failed. More nodes help thin parts that wait for them, none help a surface that bends
+/// within a cell; the walls of a wrap can be made thicker.
+std::string way_out(double nodes_to_resolve, bool wrapped, const TetrahedralisationOptions& options) {
+  if (nodes_to_resolve <= options.max_nodes)
+    return "; its surface bends too sharply for such cells: try a smaller cell size (--cell-size), or smooth it";
+  return "; its thin parts ask for " + text(nodes_to_resolve) +
+         " nodes in all: try max_nodes (--max-nodes) above that" +
+         (wrapped ? ", or a larger alpha (--alpha): the wrap is alpha / 15 thick where it is an open sheet's"
+                  : ", or another cell size");
+}
+
+/// Fills one body and adds its tets to the whole. @param advice for where that fails
 void add_body(const MeasuredBody& body, const std::string& which, const internal::Filling& how,
-              Tetrahedralisation& result, Warnings& warnings) {
+              const std::string& advice, Tetrahedralisation& result, Warnings& warnings) {
   const FilledBody filled = internal::fill(body, result.smallest_cell, how);
   result.tries += filled.tries;
   result.sharp_edges_kept = result.sharp_edges_kept && filled.sharp_edges_kept;
   const std::string sized = "tetrahedralise: " + which + " (diagonal " + text(body.body->diagonal) + " m, cells of " +
                             text(body.cell_size) + " m, " + text(result.smallest_cell) + " m where it is thin): ";
-  const std::string way_out = "; its thin parts ask for " + text(how.nodes_per_expected() * body.nodes_to_resolve()) +
-                              " nodes in all: try max_nodes (--max-nodes) above that, or another cell size";
   if (filled.mesh.tets.empty())
     throw ComputationError(sized + filled.fault + " in the best of " + std::to_string(filled.tries) +
-                           " tries, expected a mesh" + way_out);
-  if (!filled.fault.empty()) warnings.push_back(sized + filled.fault + way_out);
+                           " tries, expected a mesh" + advice);
+  if (!filled.fault.empty()) warnings.push_back(sized + filled.fault + advice);
   if (filled.dropped_tets > 0)
     warnings.push_back("tetrahedralise: " + which + ": " + std::to_string(filled.dropped_tets) +
                        " stray tetrahedra, joined to the rest by less than a face, have been dropped");
@@ -241,9 +250,12 @@ void fill_bodies(const Bodies& bodies, double cell_size, const Tetrahedralisatio
 
   start = std::chrono::steady_clock::now();
   result.sharp_edges_kept = !result.wrapped;
+  double nodes_to_resolve = 0.0;
+  for (const MeasuredBody& b : measured) nodes_to_resolve += how.nodes_per_expected() * b.nodes_to_resolve();
+  const std::string advice = way_out(nodes_to_resolve, result.wrapped, options);
   for (std::size_t b = 0; b < measured.size(); ++b) {
     tell(options, "meshing body " + std::to_string(b + 1) + " of " + std::to_string(measured.size()));
-    add_body(measured[b], "body " + std::to_string(b), how, result, warnings);
+    add_body(measured[b], "body " + std::to_string(b), how, advice, result, warnings);
     result.volume_before += bodies.bodies[b].volume;
   }
   result.seconds_mesh = seconds_since(start);
