@@ -99,7 +99,7 @@ struct EnergyTuning {
 
 /// Small steps of game contact (docs/derivations/small-steps.md).
 struct SmallStepTuning {
-  float push_share = 0.2f;  ///< of an overlap beyond the slop that a substep undoes. By judgement
+  float push_share = 0.25f;  ///< of an overlap beyond the slop that a substep undoes. By judgement
   /// m/s and rad/s: what joints are open by as a step begins comes together at this speed. By judgement.
   double recovery_speed = 1.0;
   /// Substeps in which bodies that rebound come together, and in which they part. The gap closes in the first; sweeps

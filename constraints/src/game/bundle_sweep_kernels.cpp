@@ -187,8 +187,8 @@ HWY_ATTR void PushBundles(const BundleArrays& all, bool backward, float share, f
       ReadSides(bundle, bundle.frame, pushes, lane, sides);
       const auto push = [&](std::int32_t k)
                             HWY_ATTR { PushOne(all.contacts[bundle.first + k], part, limit, sides, lane); };
-      for (std::int32_t k = bundle.count - 1; k > 0; --k) push(backward ? bundle.count - 1 - k : k);
-      for (std::int32_t k = 0; k < bundle.count; ++k) push(backward ? bundle.count - 1 - k : k);
+      for (std::int32_t k = bundle.count - 1; k > 0; --k) push(k);
+      for (std::int32_t k = 0; k < bundle.count; ++k) push(k);
       WriteSides(bundle, bundle.frame, all.standing, pushes, lane, sides);
     }
   }
