@@ -10,6 +10,7 @@
 #include "constants.h"
 #include "limber/collision/manifold_finder.h"
 #include "limber/engine/world.h"
+#include "pile.h"
 #include "random_states.h"
 #include "sample_models.h"
 #include "shapes.h"
@@ -132,6 +133,23 @@ TEST(GameOverlap, WhatStartsInTheGroundComesOutOnItsOwnSide) {
     EXPECT_GT(gap(), -5e-3 * kWidth) << trial << ": " << share;
     EXPECT_LT(gap(), 5e-3 * kWidth) << trial << ": it lies on it, " << share;
     EXPECT_GT(world.body(body).pose.p.z(), 0.2 * kWidth) << trial << ": " << share;
+  }
+}
+
+/// Boxes that bend land nearly flush on boxes, askew on them: no contact leads through the whole of one.
+TEST(GameOverlap, BoxesThatBendSinkInByLittleAsTheyLand) {
+  for (int fall = 1; fall <= 8; ++fall) {
+    Pile pile(20, 6, false);
+    for (std::size_t i = 0; i < pile.bodies.size(); ++i) {
+      const RigidTransform pose = pile.world.body(pile.bodies[i]).pose;
+      const double phase = 1.7 * static_cast<double>(i) + 2.3 * fall;
+      const Vec3 aside(std::sin(phase), std::cos(1.3 * phase), std::sin(0.7 * phase));
+      pile.world.set_pose(pile.bodies[i], {pose.q, pose.p + 1e-3 * aside});
+    }
+    for (int i = 0; i < 24; ++i) {
+      pile.step_once();
+      EXPECT_GT(pile.deepest, -0.2 * kPileSize) << fall << ' ' << i;
+    }
   }
 }
 

@@ -274,57 +274,63 @@ bool FieldEdges::goes_through(Index edge, int of, Index other, std::size_t first
                      });
 }
 
-// Where a corner goes through a ridge and beyond, no vertex is inside and no crossing may lead out of both surfaces:
-// the one along which the bodies overlap least stands for all.
+// Bodies part along one of the directions in which vertices leave and edges have crossed: that in which what they share
+// is least wide, vertices' first among those that differ by what counts as passed. Edges that have crossed otherwise do
+// not stand in their way. Where a corner goes through a ridge and beyond, no vertex is inside and no crossing may lead
+// out of both surfaces: then any crossing will do.
 void FieldEdges::cross_loop(std::size_t first, std::size_t end) {
   find_crossings(first, end);
   find_ways_out(first, end);
   const auto leads_out = [](const EdgePair& crossing) { return crossing.leads_out; };
-  if (ways_out_.empty() && std::ranges::none_of(crossings_, leads_out)) {
-    if (crossings_.empty()) return;
-    const EdgePair& crossing = narrowest_crossing(first, end);
-    return add(crossing, -crossing.direction);
-  }
-  std::erase_if(crossings_, [](const EdgePair& crossing) { return !crossing.leads_out; });
-  if (crossings_.empty()) return;
-  if (ways_out_.empty()) ways_out_.push_back(-narrowest_crossing(first, end).direction);
-  const auto same_way = static_cast<float>(collision_tuning().narrow.same_way);
+  if (!ways_out_.empty() || std::ranges::any_of(crossings_, leads_out))
+    std::erase_if(crossings_, [](const EdgePair& crossing) { return !crossing.leads_out; });
+  float least = std::numeric_limits<float>::infinity();
+  Vec3f best = Vec3f::Zero();
+  const auto try_way = [&](const Vec3f& way, float more) {
+    if (const float wide = width(way) + more; wide < least) least = wide, best = way;
+  };
+  for (const Vec3f& way : ways_out_) try_way(way, 0.0f);
+  for (const EdgePair& crossing : crossings_) try_way(-crossing.direction, passed_);
   for (const EdgePair& crossing : crossings_)
-    if (std::ranges::any_of(ways_out_, [&](const Vec3f& way) { return -crossing.direction.dot(way) > same_way; }))
-      add(crossing, -crossing.direction);
+    if (leaves_along(crossing, best)) add(crossing, -crossing.direction);
 }
 
-// Directions in which vertices leave that are inside next to the loop.
+bool FieldEdges::leaves_along(const EdgePair& crossing, const Vec3f& way) {
+  return -crossing.direction.dot(way) > static_cast<float>(collision_tuning().narrow.same_way);
+}
+
+// Directions in which vertices leave that are inside next to the loop, and the points that bound what bodies share
+// there.
 void FieldEdges::find_ways_out(std::size_t first, std::size_t end) {
   ways_out_.clear();
+  shared_.clear();
   for (std::size_t i = first; i < end; ++i) {
     const int of = piercings_[i].of;
+    shared_.push_back(piercings_[i].point);
     const CollisionSurface& surface = view_[of].mine->shell().surface();
-    const auto inside = [&](Index v) { return stamp_[of][static_cast<std::size_t>(v)] == generation_; };
-    for (const Index v : surface.edge(piercings_[i].edge).vertices) {
-      if (!inside(v)) continue;
+    const auto leave = [&](Index v) {
+      if (stamp_[of][static_cast<std::size_t>(v)] != generation_) return false;
       ways_out_.push_back(exit_[of][static_cast<std::size_t>(v)]);
+      shared_.push_back(vertex(of, v));
+      return true;
+    };
+    for (const Index v : surface.edge(piercings_[i].edge).vertices)
       // Their neighbours too: edges that do not stick out go through the loop as well and are not looked at.
-      for (const Index w : surface.vertex_neighbours(v))
-        if (inside(w)) ways_out_.push_back(exit_[of][static_cast<std::size_t>(w)]);
-    }
+      if (leave(v))
+        for (const Index w : surface.vertex_neighbours(v)) leave(w);
   }
 }
 
-// That along which the loop, and with it what both bodies share, is least wide. @pre some have crossed
-const FieldEdges::EdgePair& FieldEdges::narrowest_crossing(std::size_t first, std::size_t end) const {
-  const EdgePair* best = &crossings_.front();
-  float least = std::numeric_limits<float>::infinity();
-  for (const EdgePair& crossing : crossings_) {
-    float low = std::numeric_limits<float>::infinity(), high = -low;
-    for (std::size_t i = first; i < end; ++i) {
-      const float height = crossing.direction.dot(piercings_[i].point);
-      low = std::min(low, height), high = std::max(high, height);
-    }
-    const float width = std::max(high - low, crossing.distance);
-    if (width < least) least = width, best = &crossing;
+// Of what bodies share next to a loop, and of the edges that would part there.
+float FieldEdges::width(const Vec3f& way) const {
+  float low = std::numeric_limits<float>::infinity(), high = -low, deepest = 0.0f;
+  for (const Vec3f& point : shared_) {
+    const float height = way.dot(point);
+    low = std::min(low, height), high = std::max(high, height);
   }
-  return *best;
+  for (const EdgePair& crossing : crossings_)
+    if (leaves_along(crossing, way)) deepest = std::max(deepest, crossing.distance);
+  return std::max(high - low, deepest);
 }
 
 FeatureSide FieldEdges::on_edge(int of, Index edge, float along, const Vec3f& point) const {

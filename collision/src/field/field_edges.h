@@ -61,7 +61,8 @@ class FieldEdges {
   void cross(const Piercing& p, Index other, std::size_t first, std::size_t end);
   bool goes_through(Index edge, int of, Index other, std::size_t first, std::size_t end) const;
   void find_ways_out(std::size_t first, std::size_t end);
-  const EdgePair& narrowest_crossing(std::size_t first, std::size_t end) const;
+  static bool leaves_along(const EdgePair& crossing, const Vec3f& way);
+  float width(const Vec3f& way) const;
   void add(const EdgePair& pair, const Vec3f& normal);
   FeatureSide on_edge(int of, Index edge, float along, const Vec3f& point) const;
 
@@ -73,6 +74,7 @@ class FieldEdges {
   DisjointSets loops_;
   std::vector<EdgePair> crossings_;  ///< of one loop
   std::vector<Vec3f> ways_out_;      ///< of one loop
+  std::vector<Vec3f> shared_;        ///< points of one loop and vertices inside next to it, frame of a
   std::vector<std::uint32_t> stamp_[2];
   std::vector<Vec3f> exit_[2];
   std::uint32_t generation_ = 0;
