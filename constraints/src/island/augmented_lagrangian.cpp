@@ -31,7 +31,8 @@ void AugmentedLagrangian::iterate(IslandStep& step, IslandReport& report) {
     const Distance left = find_starts(step, !begun_);
     report.change = left.from_law;
     // Joints and hands that contradict each other, or the ground, meet in the end where no gap moves any more.
-    if (left.from_law <= 1.0 || (!step.contacts_alone && left.moved <= 1.0)) return;
+    const bool at_rest = !step.contacts_alone && left.moved <= kConstraintsTuning.rounds.newton_left;
+    if (left.from_law <= 1.0 || at_rest) return;
     if (report.iterations > step.part.options.max_iterations) break;
     const ConvexContactOptions within{
         .tolerance = kConstraintsTuning.rounds.newton_left,
