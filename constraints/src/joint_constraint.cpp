@@ -274,7 +274,7 @@ void JointConstraint::write_actuation_law(const RowPlan& plan, double gap, RowPa
 /// All act at b's frame on both parts, opposite.
 Index JointConstraint::add_row(const Instant& at, const RowPlan& plan, const Direction& along, ConstraintRows& rows) {
   const Vec3 &p = at.b.position, &n = along.linear;
-  RowSide a{a_.body(), -n, n.cross(p - at.a.origin) - along.angular, {}},
+  RowSide a{a_.body(), -n, n.cross(p - at.a.position) + n.cross(at.a.position - at.a.origin) - along.angular, {}},
       b{b_.body(), n, (p - at.b.origin).cross(n) + along.angular, {}};
   if (at.a.bend || at.b.bend) {
     FrameMeasure of_a, of_b;
