@@ -118,6 +118,7 @@ struct ManifoldFinder::Impl {
   void find_planes(std::size_t pair, Index body, internal::ManifoldWorker& worker,
                    std::vector<internal::SupportPlane>& planes);
   bool reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const;
+  double reach(Index body, const Vec3& along) const;
   double farthest(const internal::PairQuery& query) const;
   double slack(const internal::PairQuery& query) const;
   void write_contacts(std::vector<ContactPoint>& contacts, Jobs& jobs);

@@ -75,8 +75,8 @@ void ManifoldFinder::Impl::list_pairs_of_bodies() {
   seams.first_pair_of[0] = 0;
 }
 
-/// Planes, in the frame of a convex body of a pair, that it rests on or comes down on beside the other one, to which
-/// that one reaches, and along which not all of the pair's contacts are.
+/// Planes, in the frame of a convex body of a pair, that it rests on or comes down on beside the other one, with more
+/// than half of itself in front, to which that one reaches, and along which not all of the pair's contacts are.
 void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, ManifoldWorker& worker,
                                        std::vector<internal::SupportPlane>& planes) {
   planes.clear();
@@ -103,6 +103,7 @@ void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, ManifoldWorker
       if (touches_along(out)) continue;
       const double offset = pairs[beside].a == body ? out.dot(touch.at.p_b)
                                                     : out.dot(touch.at.p_a + at(pairs[beside].a).pose.p - me.pose.p);
+      if (reach(body, out) - reach(body, -out) < 2.0 * offset) continue;  // its middle is behind
       if (reaches_to(other, out, offset + out.dot(me.pose.p - at(other).pose.p), tolerance))
         planes.push_back({me.turn.transpose() * out, offset, tolerance});
     }
@@ -118,15 +119,18 @@ bool ManifoldFinder::Impl::touches_along(const Vec3& out) const {
 /// Whether a convex body reaches to normal · x = offset, x from its origin, and no farther; of meshes each triangle is
 /// looked at by itself.
 bool ManifoldFinder::Impl::reaches_to(Index body, const Vec3& normal, double offset, double tolerance) const {
-  const internal::ConvexCore* core = at(body).core();
-  if (core == nullptr) return at(body).half_space() == nullptr;
-  const Vec3 normal_B = at(body).turn.transpose() * normal;
+  if (at(body).core() == nullptr) return at(body).half_space() == nullptr;
+  return std::abs(reach(body, normal) - offset) <= tolerance;
+}
+
+/// How far a convex body reaches along a direction, from its origin.
+double ManifoldFinder::Impl::reach(Index body, const Vec3& along) const {
+  const internal::ConvexCore& core = *at(body).core();
+  const Vec3 along_B = at(body).turn.transpose() * along;
+  if (core.half_extents[0] > 0.0) return along_B.cwiseAbs().dot(core.half_extents) + core.radius;
   double highest = -std::numeric_limits<double>::infinity();
-  if (core->half_extents[0] > 0.0)
-    highest = normal_B.cwiseAbs().dot(core->half_extents);
-  else
-    for (const Vec3& p : core->points) highest = std::max(highest, normal_B.dot(p));
-  return std::abs(highest + core->radius - offset) <= tolerance;
+  for (const Vec3& p : core.points) highest = std::max(highest, along_B.dot(p));
+  return highest + core.radius;
 }
 
 }  // namespace limber
