@@ -284,12 +284,13 @@ void FieldEdges::cross_loop(std::size_t first, std::size_t end) {
   const auto leads_out = [](const EdgePair& crossing) { return crossing.leads_out; };
   if (!ways_out_.empty() || std::ranges::any_of(crossings_, leads_out))
     std::erase_if(crossings_, [](const EdgePair& crossing) { return !crossing.leads_out; });
+  if (crossings_.empty()) return;
   float least = std::numeric_limits<float>::infinity();
   Vec3f best = Vec3f::Zero();
   const auto try_way = [&](const Vec3f& way, float more) {
     if (const float wide = width(way) + more; wide < least) least = wide, best = way;
   };
-  for (const Vec3f& way : ways_out_) try_way(way, 0.0f);
+  for (const WayOut& way : ways_out_) try_way(way.along, 0.0f);
   for (const EdgePair& crossing : crossings_) try_way(-crossing.direction, passed_);
   for (const EdgePair& crossing : crossings_)
     if (leaves_along(crossing, best)) add(crossing, -crossing.direction);
@@ -310,7 +311,9 @@ void FieldEdges::find_ways_out(std::size_t first, std::size_t end) {
     const CollisionSurface& surface = view_[of].mine->shell().surface();
     const auto leave = [&](Index v) {
       if (stamp_[of][static_cast<std::size_t>(v)] != generation_) return false;
-      ways_out_.push_back(exit_[of][static_cast<std::size_t>(v)]);
+      const auto known = [&](const WayOut& way) { return way.of == of && way.vertex == v; };
+      if (std::ranges::any_of(ways_out_, known)) return true;
+      ways_out_.push_back({of, v, exit_[of][static_cast<std::size_t>(v)]});
       shared_.push_back(vertex(of, v));
       return true;
     };

@@ -38,6 +38,11 @@ class FieldEdges {
     float distance;
     bool leads_out = true;  ///< of edges that have crossed: against the direction both surfaces part there
   };
+  struct WayOut {
+    int of;
+    Index vertex;
+    Vec3f along;
+  };
   struct Crossed {
     std::uint64_t facets;
     Index piercing;
@@ -73,7 +78,7 @@ class FieldEdges {
   std::vector<Crossed> crossed_;
   DisjointSets loops_;
   std::vector<EdgePair> crossings_;  ///< of one loop
-  std::vector<Vec3f> ways_out_;      ///< of one loop
+  std::vector<WayOut> ways_out_;     ///< of one loop, of each vertex once
   std::vector<Vec3f> shared_;        ///< points of one loop and vertices inside next to it, frame of a
   std::vector<std::uint32_t> stamp_[2];
   std::vector<Vec3f> exit_[2];
