@@ -82,7 +82,8 @@ void SmallStepSolver::Impl::take_substep(const SmallStepProblem& problem, const 
   contacts.sweep(bodies, true, jobs);
   if (overlap) {
     std::ranges::fill(bodies.pushes(), internal::Block8{});
-    contacts.push_apart(bodies, steps.push_speed, number % 2 != 0, jobs);
+    const bool backward = number % 2 != 0;  // in turns, so that no pair is always the last
+    contacts.push_apart(bodies, steps.push_speed, backward, jobs);
   }
   bodies.end_substep(overlap, jobs);
   constraints.close(states, bodies, overlap);
