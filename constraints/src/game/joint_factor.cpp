@@ -16,23 +16,22 @@ constexpr int size_of(int given) {
   return fixed > 0 ? fixed : given;
 }
 
-/// L of the lower part of a, n × n, in its place; its diagonal is inverted. @param own each row's own response, of
-/// which others that say the same leave no more than round-off, of either sign
+/// L and 1/D of the lower part of a = L D Lᵀ, n × n, in its place; L's own diagonal is 1. @param own each row's own
+/// response, of which others that say the same leave no more than round-off, of either sign
 template <int fixed>
 void factor_dense(double* a, int given, const double* own) {
   const int n = size_of<fixed>(given);
-  for (int j = 0; j < n; ++j) {
-    double* row_j = a + j * n;
-    double pivot = row_j[j];
-    for (int k = 0; k < j; ++k) pivot -= row_j[k] * row_j[k];
-    const double inverse = 1.0 / std::sqrt(std::max(pivot, 1e-3 * kRegular * own[j]));
-    row_j[j] = inverse;
-    for (int i = j + 1; i < n; ++i) {
-      double* row_i = a + i * n;
-      double sum = row_i[j];
-      for (int k = 0; k < j; ++k) sum -= row_i[k] * row_j[k];
-      row_i[j] = sum * inverse;
+  for (int i = 0; i < n; ++i) {
+    double* row = a + i * n;
+    for (int j = 1; j < i; ++j)
+      for (int k = 0; k < j; ++k) row[j] -= row[k] * a[j * n + k];
+    double pivot = row[i];
+    for (int k = 0; k < i; ++k) {
+      const double scaled = row[k] * a[k * n + k];
+      pivot -= row[k] * scaled;
+      row[k] = scaled;
     }
+    row[i] = 1.0 / std::max(pivot, 1e-3 * kRegular * own[i]);
   }
 }
 
@@ -41,23 +40,27 @@ template <int fixed>
 void solve_rows(const double* l, int given, double* b, int rows) {
   const int n = size_of<fixed>(given);
   for (int i = 0; i < size_of<fixed>(rows); ++i, b += n)
-    for (int j = 0; j < n; ++j) {
-      double sum = b[j];
-      for (int k = 0; k < j; ++k) sum -= l[j * n + k] * b[k];
-      b[j] = sum * l[j * n + j];
+    for (int j = 1; j < n; ++j)
+      for (int k = 0; k < j; ++k) b[j] -= l[j * n + k] * b[k];
+}
+
+/// t −= b D⁻¹ aᵀ, `rows` × `columns`, inner size n.
+template <int fixed>
+void subtract_product(const double* b, int rows, const double* a, int columns, const double* l, int given, double* t) {
+  const int n = size_of<fixed>(given), count = size_of<fixed>(columns);
+  for (int j = 0; j < count; ++j)
+    for (int k = 0; k < n; ++k) {
+      const double scaled = a[j * n + k] * l[k * n + k];
+      for (int i = 0; i < size_of<fixed>(rows); ++i) t[i * count + j] -= b[i * n + k] * scaled;
     }
 }
 
-/// t −= b aᵀ, `rows` × `columns`, inner size n.
+/// b ← b D⁻¹
 template <int fixed>
-void subtract_product(const double* b, int rows, const double* a, int columns, int given, double* t) {
-  const int n = size_of<fixed>(given), count = size_of<fixed>(columns);
+void scale_rows(const double* l, int given, double* b, int rows) {
+  const int n = size_of<fixed>(given);
   for (int i = 0; i < size_of<fixed>(rows); ++i)
-    for (int j = 0; j < count; ++j) {
-      double sum = 0.0;
-      for (int k = 0; k < n; ++k) sum += b[i * n + k] * a[j * n + k];
-      t[i * count + j] -= sum;
-    }
+    for (int k = 0; k < n; ++k) b[i * n + k] *= l[k * n + k];
 }
 
 template <std::size_t columns>
@@ -72,20 +75,24 @@ void subtract(double by, const Sides<columns>& from, Sides<columns>& to) {
 template <int fixed, std::size_t columns>
 void solve_lower(const double* l, int given, Sides<columns>* x) {
   const int n = size_of<fixed>(given);
-  for (int i = 0; i < n; ++i) {
+  for (int i = 1; i < n; ++i)
     for (int k = 0; k < i; ++k) subtract(l[i * n + k], x[k], x[i]);
+}
+
+/// x ← D⁻¹ x
+template <int fixed, std::size_t columns>
+void scale(const double* l, int given, Sides<columns>* x) {
+  const int n = size_of<fixed>(given);
+  for (int i = 0; i < n; ++i)
     for (double& number : x[i]) number *= l[i * n + i];
-  }
 }
 
 /// x ← L⁻ᵀ x
 template <int fixed, std::size_t columns>
 void solve_upper(const double* l, int given, Sides<columns>* x) {
   const int n = size_of<fixed>(given);
-  for (int i = n; i-- > 0;) {
+  for (int i = n; i-- > 0;)
     for (int k = i + 1; k < n; ++k) subtract(l[k * n + i], x[k], x[i]);
-    for (double& number : x[i]) number *= l[i * n + i];
-  }
 }
 
 /// y −= b x, b `rows` × n
@@ -116,7 +123,8 @@ void JointFactor::set_graph(std::size_t nodes, std::span<const Pair> couplings) 
   order();
 }
 
-/// Least degree, the lower number first. What the graph of the others becomes is kept as it is.
+/// Least degree, what has it longest first: eliminations that follow each other then seldom wait for each other, as a
+/// chain goes from both ends. What the graph of the others becomes is kept as it is.
 void JointFactor::order() {
   sizes_.clear();
   std::vector<std::vector<std::int32_t>> neighbours(nodes_), columns(nodes_);
@@ -124,11 +132,12 @@ void JointFactor::order() {
     neighbours[static_cast<std::size_t>(a)].push_back(b);
     neighbours[static_cast<std::size_t>(b)].push_back(a);
   }
-  using Entry = std::array<std::int32_t, 2>;  // degree, node
+  using Entry = std::array<std::int32_t, 3>;  // degree, turn, node
+  std::int32_t turn = 0;
   std::vector<Entry> heap;
   const auto later = [](const Entry& a, const Entry& b) { return a > b; };
   const auto push = [&](std::int32_t node) {
-    heap.push_back({static_cast<std::int32_t>(neighbours[static_cast<std::size_t>(node)].size()), node});
+    heap.push_back({static_cast<std::int32_t>(neighbours[static_cast<std::size_t>(node)].size()), turn++, node});
     std::push_heap(heap.begin(), heap.end(), later);
   };
   for (std::size_t i = 0; i < nodes_; ++i) {
@@ -140,7 +149,7 @@ void JointFactor::order() {
   std::vector<std::int32_t> merged;
   while (pattern_.node_at.size() < nodes_) {
     std::pop_heap(heap.begin(), heap.end(), later);
-    const std::int32_t degree = heap.back()[0], node = heap.back()[1];
+    const std::int32_t degree = heap.back()[0], node = heap.back()[2];
     heap.pop_back();
     const auto at = static_cast<std::size_t>(node);
     if (pattern_.position[at] >= 0 || degree != static_cast<std::int32_t>(neighbours[at].size())) continue;
@@ -264,21 +273,26 @@ void JointFactor::eliminate(std::size_t column) {
                 columns = sizes_[static_cast<std::size_t>(pattern_.rows[a])];
       (ball && rows == 3 && columns == 3 ? subtract_product<3>
                                          : subtract_product<0>)(&values_[starts_[nodes_ + b]], rows,
-                                                                &values_[starts_[nodes_ + a]], columns, n,
+                                                                &values_[starts_[nodes_ + a]], columns, l, n,
                                                                 &values_[starts_[static_cast<std::size_t>(to)]]);
     }
+  for (std::size_t e = begin; e < end; ++e) {
+    const int rows = sizes_[static_cast<std::size_t>(pattern_.rows[e])];
+    (ball && rows == 3 ? scale_rows<3> : scale_rows<0>)(l, n, &values_[starts_[nodes_ + e]], rows);
+  }
 }
 
 /// The product of two blocks of a column: its size goes to both diagonals.
 void JointFactor::leave_out(std::size_t column, std::size_t a, std::size_t b) {
   const int n = sizes_[column];
+  const double* l = &values_[starts_[column]];
   const auto row_a = static_cast<std::size_t>(pattern_.rows[a]), row_b = static_cast<std::size_t>(pattern_.rows[b]);
   double square = 0.0;
   for (int i = 0; i < sizes_[row_b]; ++i)
     for (int j = 0; j < sizes_[row_a]; ++j) {
       double sum = 0.0;
       for (int k = 0; k < n; ++k)
-        sum += values_[starts_[nodes_ + b] + static_cast<std::size_t>(i * n + k)] *
+        sum += values_[starts_[nodes_ + b] + static_cast<std::size_t>(i * n + k)] * l[k * n + k] *
                values_[starts_[nodes_ + a] + static_cast<std::size_t>(j * n + k)];
       square += sum * sum;
     }
@@ -307,6 +321,7 @@ void JointFactor::solve(std::span<double> x) const {
   for (std::size_t p = nodes_; p-- > 0;) {
     const int n = sizes_[p];
     const bool ball = n == 3;
+    (ball ? scale<3, columns> : scale<0, columns>)(values_.data() + starts_[p], n, sides_at(p));
     for (std::size_t e = pattern_.column_starts[p]; e < pattern_.column_starts[p + 1]; ++e) {
       const auto row = static_cast<std::size_t>(pattern_.rows[e]);
       const int rows = sizes_[row];

@@ -1,11 +1,11 @@
-// Block Cholesky of J Jᵀ + C, the matrix of all joints and handles together.
+// Block LDLᵀ of J Jᵀ + C, the matrix of all joints and handles together.
 //
 // A node is a constraint, and two nodes couple where they share a body that moves. Nodes are eliminated in the order of
 // least degree: leaves first along a tree, whose factor then has no more blocks than the matrix, so that time is linear
 // in its links. Loops fill in.
 //
 // Nodes that have many neighbours when their turn comes, as in nets of a thousand meshes, fill in no more. Each product
-// that has no place is left out, and its size added to the diagonals of its two nodes: LLᵀ − J Jᵀ − C has then no
+// that has no place is left out, and its size added to the diagonals of its two nodes: LDLᵀ − J Jᵀ − C has then no
 // negative eigenvalue, so that solving by it again and again converges.
 //
 // Rows that say the same make the matrix singular. A part kRegular of each row's own response is added to its diagonal:
