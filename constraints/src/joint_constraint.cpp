@@ -134,6 +134,12 @@ JointConstraint::Instant JointConstraint::instant(const BodyStates& states, Step
   return {.a = a_.at(states, when), .b = b_.at(states, when)};
 }
 
+/// With what rows look at: of b those of distances along a's axes see its origin alone.
+JointConstraint::Instant JointConstraint::instant_of_rows(const BodyStates& states, StepTime when) const {
+  const bool axes = std::ranges::any_of(rows_, [](const RowPlan& r) { return r.measure != Measure::kTranslation; });
+  return {.a = a_.at(states, when), .b = b_.at(states, when, axes)};
+}
+
 /// Of its coordinates, angles within half a turn.
 Vec3 JointConstraint::raw_coordinates(const Instant& at) const {
   const Mat3 Q = at.a.axes.transpose() * at.b.axes;
@@ -274,8 +280,12 @@ void JointConstraint::write_actuation_law(const RowPlan& plan, double gap, RowPa
 /// All act at b's frame on both parts, opposite.
 Index JointConstraint::add_row(const Instant& at, const RowPlan& plan, const Direction& along, ConstraintRows& rows) {
   const Vec3 &p = at.b.position, &n = along.linear;
-  RowSide a{a_.body(), -n, n.cross(p - at.a.position) + n.cross(at.a.position - at.a.origin) - along.angular, {}},
-      b{b_.body(), n, (p - at.b.origin).cross(n) + along.angular, {}};
+  const Vec3 between = p - at.a.position, arm_a = at.a.position - at.a.origin, arm_b = p - at.b.origin;
+  RowSide a{a_.body(), -n, {}, {}}, b{b_.body(), n, {}, {}};
+  for (int k = 0; k < 3; ++k) {
+    a.angular[k] = cross_component(n, between, k) + cross_component(n, arm_a, k) - along.angular[k];
+    b.angular[k] = cross_component(arm_b, n, k) + along.angular[k];
+  }
   if (at.a.bend || at.b.bend) {
     FrameMeasure of_a, of_b;
     bend(at, plan, along, of_a, of_b);
@@ -297,16 +307,18 @@ void JointConstraint::bend(const Instant& at, const RowPlan& plan, const Directi
     }
     return;
   }
-  if (b.bend) b.bend_point(b.position, along.linear, of_b), b.bend_turn(along.angular, of_b);
-  if (!a.bend) return;
-  if (plan.measure == Measure::kTranslation) a.bend_axis(plan.axis, plan.sign * (b.position - a.position), of_a);
-  a.bend_point(plan.measure == Measure::kTranslation ? a.position : b.position, -along.linear, of_a);
-  a.bend_turn(-along.angular, of_a);
+  if (b.bend) b.bend_origin(along.linear, of_b);
+  if (plan.measure == Measure::kTranslation) {
+    if (a.bend) a.bend_axis(plan.axis, plan.sign * (b.position - a.position), of_a), a.bend_origin(-along.linear, of_a);
+    return;
+  }
+  if (b.bend) b.bend_turn(along.angular, of_b);
+  if (a.bend) a.bend_point(b.position, -along.linear, of_a), a.bend_turn(-along.angular, of_a);
 }
 
 void JointConstraint::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
   if (when == StepTime::kMiddle) return add_mean_rows(states, rows);
-  Instant at = instant(states, when);
+  Instant at = instant_of_rows(states, when);
   at.a.find_turning(), at.b.find_turning();
   if (when == StepTime::kStart) step_ = step, axes_at_start_ = at.a.axes;
   const auto arm = [&](const FrameInstant& part) { return part.body < 0 ? 0.0 : (at.b.position - part.origin).norm(); };
@@ -386,14 +398,15 @@ void JointConstraint::add_force_derivative(const BodyStates& states, std::span<c
 }
 
 void JointConstraint::gaps(const BodyStates& states, StepTime when, std::span<double> gaps) const {
-  const Instant at = instant(states, when);
+  const Instant at = instant_of_rows(states, when);
   for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i] = gap(at, rows_[i]);
 }
 
 void JointConstraint::accept(const BodyStates& states, std::span<const double> impulses) {
-  force_.locked = Vec3::Zero(), force_.coordinate = {}, force_.actuation = {};
+  force_.coordinate = {}, force_.actuation = {};
   force_.plan.resize(plan_.size());
   const double by = 1.0 / step_;
+  double locked[3] = {};
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     const RowPlan& plan = rows_[i];
     const double force = by * impulses[i];
@@ -401,8 +414,9 @@ void JointConstraint::accept(const BodyStates& states, std::span<const double> i
     if (plan.coordinate >= 0)
       force_.coordinate[static_cast<std::size_t>(plan.coordinate)] += plan.sign * force;
     else if (plan.measure == Measure::kTranslation)
-      force_.locked += force * axes_at_start_.col(plan.axis);
+      for (int k = 0; k < 3; ++k) locked[k] += force * axes_at_start_(k, plan.axis);
   }
+  force_.locked = {locked[0], locked[1], locked[2]};
   if (!ends_step_ && !counts_turns_) return;
   const Instant at = instant(states, StepTime::kStart);  // the state has been taken: the step's end
   const Vec3 raw = raw_coordinates(at);

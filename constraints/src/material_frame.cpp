@@ -78,6 +78,18 @@ Vec3 times(const std::vector<Vec3>& shapes, std::span<const double> z) {
   return {u, v, w};
 }
 
+/// to = q x of so many vectors, in registers (cross_matrix.h says why).
+void turn_vectors(const Quaternion& q, const double* x, int count, double* to) {
+  const double tx = 2.0 * q.x, ty = 2.0 * q.y, tz = 2.0 * q.z, wx = tx * q.w, wy = ty * q.w, wz = tz * q.w,
+               xx = tx * q.x, xy = ty * q.x, xz = tz * q.x, yy = ty * q.y, yz = tz * q.y, zz = tz * q.z;
+  for (int i = 0; i < count; ++i, x += 3, to += 3) {
+    const double u = x[0], v = x[1], w = x[2];
+    to[0] = (1.0 - (yy + zz)) * u + (xy - wz) * v + (xz + wy) * w;
+    to[1] = (xy + wz) * u + (1.0 - (xx + zz)) * v + (yz - wx) * w;
+    to[2] = (xz - wy) * u + (yz + wx) * v + (1.0 - (xx + yy)) * w;
+  }
+}
+
 HalfTurn half_of(const Vec3& r) {
   const double angle = r.norm();
   return {angle, std::cos(0.5 * angle), angle > 0.0 ? std::sin(0.5 * angle) / angle : 0.5};
@@ -235,24 +247,24 @@ Vec3 MaterialFrame::turn(const BodyStates& states) const {
 }
 
 /// At one of the step's ends.
-FrameInstant MaterialFrame::at_end(const BodyStates& states, StepTime when) const {
+FrameInstant MaterialFrame::at_end(const BodyStates& states, StepTime when, bool axes) const {
   const RigidTransform& pose = states.pose(body_, when);
-  const Mat3 R = to_matrix(pose.q);
-  FrameInstant at{.states = states,
-                  .when = when,
-                  .body = body_,
-                  .position = pose.p + R * rest_.origin,
-                  .axes = R * rest_.axes,
-                  .origin = pose.p};
-  if (displacement_.empty()) return at;
+  FrameInstant at{.states = states, .when = when, .body = body_, .origin = pose.p};
+  const auto write = [&](const Vec3& origin_B, const Mat3& axes_B) {
+    turn_vectors(pose.q, origin_B.data(), 1, at.position.data());
+    for (int k = 0; k < 3; ++k) at.position[k] += pose.p[k];
+    if (axes) turn_vectors(pose.q, axes_B.data(), 3, at.axes.data());
+  };
+  if (displacement_.empty()) return write(rest_.origin, rest_.axes), at;
   const std::span<const double> z = states.amplitudes(body_, when);
-  at.position = pose.p + R * (anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)));
   // Named for clang, to which a nested class has no default constructor within the class about it.
-  FrameInstant::Bend& bend = at.bend.emplace(FrameInstant::Bend{.R_BW = R.transpose(), .axes_B = rest_.axes});
-  if (rotation_.empty()) return at;
-  bend.turned = turn(z), bend.half = half_of(bend.turned);
-  bend.axes_B = rotation_by(bend.turned, bend.half) * rest_.axes;
-  at.axes = R * bend.axes_B;
+  FrameInstant::Bend& bend =
+      at.bend.emplace(FrameInstant::Bend{.R_BW = to_matrix(pose.q).transpose(), .axes_B = rest_.axes});
+  if (axes && !rotation_.empty()) {
+    bend.turned = turn(z), bend.half = half_of(bend.turned);
+    bend.axes_B = rotation_by(bend.turned, bend.half) * rest_.axes;
+  }
+  write(anchors_.empty() ? Vec3(rest_.origin + displace(z)) : place(states.shape(body_, when)), bend.axes_B);
   return at;
 }
 
@@ -271,11 +283,13 @@ FrameInstant MaterialFrame::between(const FrameInstant& start, const FrameInstan
 }
 
 void FrameInstant::find_turning() {
-  if (bend) bend->turning = turning_between(*bend, *bend);
+  if (bend && bend->half.angle > 0.0) bend->turning = turning_between(*bend, *bend);
 }
 
+void FrameInstant::bend_origin(const Vec3& n, FrameMeasure& to) const { to.shift_B += bend->R_BW * n; }
+
 void FrameInstant::bend_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const {
-  to.shift_B += bend->R_BW * n;
+  bend_origin(n, to);
   to.turn_B += bend->R_BW * (p - position).cross(n);
 }
 
@@ -291,7 +305,7 @@ RowSide MaterialFrame::side(const FrameInstant& at, const Vec3& n, std::vector<d
   RowSide side{body_, n, (at.position - at.origin).cross(n), {}};
   if (!at.bend) return side;
   FrameMeasure bent;
-  at.bend_point(at.position, n, bent);
+  at.bend_origin(n, bent);
   write_modal(at, bent, modal);
   side.modal = modal;
   return side;
@@ -300,8 +314,9 @@ RowSide MaterialFrame::side(const FrameInstant& at, const Vec3& n, std::vector<d
 void MaterialFrame::write_modal(const FrameInstant& at, const FrameMeasure& measure, std::vector<double>& modal) const {
   modal.resize(displacement_.size());
   const Vec3 shift = anchors_.empty() ? measure.shift_B : Vec3(Vec3::Zero()), turn = measure.turn_B;
+  const bool turns = !rotation_.empty() && !turn.isZero(0.0);
   for (std::size_t i = 0; i < modal.size(); ++i)
-    modal[i] = displacement_[i].dot(shift) + (rotation_.empty() ? 0.0 : rotation_[i].dot(turn));
+    modal[i] = displacement_[i].dot(shift) + (turns ? rotation_[i].dot(turn) : 0.0);
   if (!anchors_.empty() && !measure.shift_B.isZero(0.0)) add_rows(at.states, at.when, measure.shift_B, modal);
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "../tuning.h"
+#include "limber/core/cross_matrix.h"
 
 namespace limber::internal {
 namespace {
@@ -99,8 +100,11 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
     for (std::size_t i = 0; i < group.count; ++i, to += side.coordinates) {
       const ConstraintRows::Side& from = made_.row(static_cast<Index>(i)).sides[s];
       const GameRow& row = rows_[group.first + i];
-      pull.force += (closing ? row.closing : row.force) * from.linear;
-      pull.arm += from.linear.cross(from.angular);  // across each direction: r again in all but one
+      const double by = closing ? row.closing : row.force;
+      for (int k = 0; k < 3; ++k)
+        pull.force[k] += by * from.linear[k],
+            pull.arm[k] +=
+            cross_component(from.linear, from.angular, k);  // across each direction: r again in all but one
       pull.directions += from.linear.squaredNorm();
       Eigen::Map<Vec3>{to} = shift.cwiseProduct(from.linear);
       Eigen::Map<Vec3>{to + 3}.noalias() = turn * from.angular;

@@ -72,7 +72,7 @@ class JointConstraint final : public Constraint {
   /// Both frames at one instant.
   struct Instant {
     FrameInstant a, b;
-    Vec3 d = a.axes.transpose() * (b.position - a.position);  // in a's axes
+    Vec3 d = a.local(b.position);  // in a's axes
   };
   /// What a row measures: d_i; one axis of b across one of a; q_i of the vector part of Q's quaternion, twice; the
   /// screw's d_x − pitch q; an angle q; how far x_b is from x_a.
@@ -106,6 +106,7 @@ class JointConstraint final : public Constraint {
 
   std::array<TurnAxes, 2> turn_axes(const RowPlan& row) const;
   Instant instant(const BodyStates& states, StepTime when) const;
+  Instant instant_of_rows(const BodyStates& states, StepTime when) const;
   Vec3 raw_coordinates(const Instant& at) const;
   double unwrapped(double raw, int i) const;
   double coordinate(const Instant& at, int i) const { return unwrapped(raw_coordinates(at)[i], i); }

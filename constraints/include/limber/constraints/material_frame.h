@@ -54,9 +54,18 @@ struct FrameInstant {
   Vec3 origin = Vec3::Zero();    ///< of the body, world, m
   std::optional<Bend> bend{};
 
+  /// Of a point of the world, from its origin in its axes.
+  Vec3 local(const Vec3& p) const {
+    const double x = p[0] - position[0], y = p[1] - position[1], z = p[2] - position[2];
+    const auto along = [&](int i) { return axes(0, i) * x + axes(1, i) * y + axes(2, i) * z; };
+    return {along(0), along(1), along(2)};
+  }
+
   /// Before bend_axis() and bend_turn(), at one of the step's ends.
   void find_turning();
   // What modes add. @pre bend
+  /// To the velocity of the frame's origin along n. @param n world
+  void bend_origin(const Vec3& n, FrameMeasure& to) const;
   /// To the velocity along n of the material point that is at p now, the frame's motion carried on rigidly to it.
   /// @param p, n world
   void bend_point(const Vec3& p, const Vec3& n, FrameMeasure& to) const;
@@ -91,10 +100,11 @@ class MaterialFrame {
   /// The Cayley vector of the body's turn over the step (BodyStates), and to first order that of the deformation.
   Vec3 turn(const BodyStates& states) const;
 
-  /// The frame at one time of a step, with what all rows about it share.
-  FrameInstant at(const BodyStates& states, StepTime when) const {
+  /// The frame at one time of a step, with what all rows about it share. @param axes whether its axes count; else they
+  /// are the world's at one of the step's ends
+  FrameInstant at(const BodyStates& states, StepTime when, bool axes = true) const {
     return when == StepTime::kMiddle ? between(at_end(states, StepTime::kStart), at_end(states, StepTime::kEnd))
-                                     : at_end(states, when);
+                                     : at_end(states, when, axes);
   }
   /// The middle, from both ends.
   FrameInstant between(const FrameInstant& start, const FrameInstant& end) const;
@@ -124,7 +134,7 @@ class MaterialFrame {
     std::vector<Vec3> shapes{};  // one per mode
   };
 
-  FrameInstant at_end(const BodyStates& states, StepTime when) const;
+  FrameInstant at_end(const BodyStates& states, StepTime when, bool axes = true) const;
   Vec3 turn(std::span<const double> z) const;      // Θ z
   Vec3 displace(std::span<const double> z) const;  // D z
   Vec3 place(const BodyShape& shape) const;
