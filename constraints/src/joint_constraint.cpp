@@ -281,8 +281,9 @@ void JointConstraint::write_actuation_law(const RowPlan& plan, double gap, RowPa
 Index JointConstraint::add_row(const Instant& at, const RowPlan& plan, const Direction& along, ConstraintRows& rows) {
   const Vec3 &p = at.b.position, &n = along.linear;
   const Vec3 between = p - at.a.position, arm_a = at.a.position - at.a.origin, arm_b = p - at.b.origin;
-  RowSide a{a_.body(), -n, {}, {}}, b{b_.body(), n, {}, {}};
+  RowSide a{.body = a_.body()}, b{.body = b_.body()};
   for (int k = 0; k < 3; ++k) {
+    a.linear[k] = -n[k], b.linear[k] = n[k];
     a.angular[k] = cross_component(n, between, k) + cross_component(n, arm_a, k) - along.angular[k];
     b.angular[k] = cross_component(arm_b, n, k) + along.angular[k];
   }

@@ -251,11 +251,15 @@ FrameInstant MaterialFrame::at_end(const BodyStates& states, StepTime when, bool
   const RigidTransform& pose = states.pose(body_, when);
   FrameInstant at{.states = states, .when = when, .body = body_, .origin = pose.p};
   const auto write = [&](const Vec3& origin_B, const Mat3& axes_B) {
-    turn_vectors(pose.q, origin_B.data(), 1, at.position.data());
-    for (int k = 0; k < 3; ++k) at.position[k] += pose.p[k];
+    double arm[3];
+    turn_vectors(pose.q, origin_B.data(), 1, arm);
+    at.position = {pose.p[0] + arm[0], pose.p[1] + arm[1], pose.p[2] + arm[2]};
     if (axes) turn_vectors(pose.q, axes_B.data(), 3, at.axes.data());
   };
-  if (displacement_.empty()) return write(rest_.origin, rest_.axes), at;
+  if (displacement_.empty()) {
+    write(rest_.origin, rest_.axes);
+    return at;
+  }
   const std::span<const double> z = states.amplitudes(body_, when);
   // Named for clang, to which a nested class has no default constructor within the class about it.
   FrameInstant::Bend& bend =

@@ -20,6 +20,9 @@ Eigen::Map<const Block<count>> block(const double* at) {
   return Eigen::Map<const Block<count>>(at);
 }
 
+/// By component, as cross_component().
+double inner(const Vec3& u, const Vec3& v) { return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]; }
+
 /// x += Σ f row of a block. @param next from row to row
 template <int count>
 inline void add_rows(const double* row, std::int32_t next, const double* forces, std::size_t rows, double* x) {
@@ -101,13 +104,13 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
       const ConstraintRows::Side& from = made_.row(static_cast<Index>(i)).sides[s];
       const GameRow& row = rows_[group.first + i];
       const double by = closing ? row.closing : row.force;
-      for (int k = 0; k < 3; ++k)
-        pull.force[k] += by * from.linear[k],
-            pull.arm[k] +=
-            cross_component(from.linear, from.angular, k);  // across each direction: r again in all but one
-      pull.directions += from.linear.squaredNorm();
-      Eigen::Map<Vec3>{to} = shift.cwiseProduct(from.linear);
-      Eigen::Map<Vec3>{to + 3}.noalias() = turn * from.angular;
+      for (int k = 0; k < 3; ++k) {
+        pull.force[k] += by * from.linear[k];
+        pull.arm[k] += cross_component(from.linear, from.angular, k);  // across each direction: r again in all but one
+        to[k] = shift[k] * from.linear[k];
+        to[3 + k] = turn(k, 0) * from.angular[0] + turn(k, 1) * from.angular[1] + turn(k, 2) * from.angular[2];
+      }
+      pull.directions += inner(from.linear, from.linear);
       if (body.modes != nullptr) {
         const std::span<const double> modal = made_.modal(from);
         for (std::size_t m = 0; m < modal.size(); ++m)
@@ -117,7 +120,7 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
       if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
     }
     if (!(pull.directions > 1.5)) continue;
-    pull.arm /= pull.directions - 1.0;
+    for (int k = 0; k < 3; ++k) pull.arm[k] /= pull.directions - 1.0;
     closing ? resist(body, pull, scales_[static_cast<std::size_t>(side.frame)])
             : stiffen(body, pull, scales_[static_cast<std::size_t>(side.frame)]);
   }
@@ -126,13 +129,14 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
 /// A force F at an arm r that pulls outward turns a body back by k = r·F (1 − f fᵀ), f its direction. In units of the
 /// body's inertia, about the axes of its coordinates.
 void GameRows::stiffen(const GameBody& body, const Pull& at, Turns& stiffness) {
-  const double outward = at.force.dot(at.arm);
+  const double outward = inner(at.force, at.arm);
   if (!(outward > 0.0)) return;
-  const Vec3 along = body.turn_scale * at.force;
-  const double by = 1.0 / at.force.squaredNorm();
-  for (int axis = 0; axis < 3; ++axis)
-    stiffness[static_cast<std::size_t>(axis)] +=
-        outward * std::max(0.0, body.turn_scale.row(axis).squaredNorm() - by * along[axis] * along[axis]);
+  const double by = 1.0 / inner(at.force, at.force);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 row = body.turn_scale.row(axis);
+    const double along = inner(row, at.force);
+    stiffness[static_cast<std::size_t>(axis)] += outward * std::max(0.0, inner(row, row) - by * along * along);
+  }
 }
 
 /// The second derivative of the gaps times their forces, by a turn, is r·F 1 − ½(r Fᵀ + F rᵀ): no more than |r| |F| in

@@ -145,7 +145,9 @@ class ConstraintRows {
  private:
   void write(const RowSide& from, Side& to) {
     if (from.body < 0) return void(to = {});
-    to = {from.body, from.linear, from.angular, modal_.size(), from.modal.size()};
+    to.body = from.body, to.modal_begin = modal_.size(), to.modal_count = from.modal.size();
+    for (int k = 0; k < 3; ++k)  // cross_matrix.h says why
+      to.linear[k] = from.linear[k], to.angular[k] = from.angular[k];
     if (!from.modal.empty()) modal_.insert(modal_.end(), from.modal.begin(), from.modal.end());
   }
   void join_sides(Row& row);
