@@ -35,15 +35,6 @@ void factor_dense(double* a, int given, const double* own) {
   }
 }
 
-/// b ← b L⁻ᵀ, `rows` × n.
-template <int fixed>
-void solve_rows(const double* l, int given, double* b, int rows) {
-  const int n = size_of<fixed>(given);
-  for (int i = 0; i < size_of<fixed>(rows); ++i, b += n)
-    for (int j = 1; j < n; ++j)
-      for (int k = 0; k < j; ++k) b[j] -= l[j * n + k] * b[k];
-}
-
 /// t −= b D⁻¹ aᵀ, `rows` × `columns`, inner size n.
 template <int fixed>
 void subtract_product(const double* b, int rows, const double* a, int columns, const double* l, int given, double* t) {
@@ -53,14 +44,6 @@ void subtract_product(const double* b, int rows, const double* a, int columns, c
       const double scaled = a[j * n + k] * l[k * n + k];
       for (int i = 0; i < size_of<fixed>(rows); ++i) t[i * count + j] -= b[i * n + k] * scaled;
     }
-}
-
-/// b ← b D⁻¹
-template <int fixed>
-void scale_rows(const double* l, int given, double* b, int rows) {
-  const int n = size_of<fixed>(given);
-  for (int i = 0; i < size_of<fixed>(rows); ++i)
-    for (int k = 0; k < n; ++k) b[i * n + k] *= l[k * n + k];
 }
 
 template <std::size_t columns>
@@ -258,10 +241,10 @@ void JointFactor::eliminate(std::size_t column) {
   (ball ? factor_dense<3> : factor_dense<0>)(l, n, &own_[firsts_[column]]);
   const std::size_t begin = pattern_.column_starts[column], end = pattern_.column_starts[column + 1];
   auto target = static_cast<std::size_t>(pattern_.target_starts[column]);
-  for (std::size_t e = begin; e < end; ++e) {
-    const int rows = sizes_[static_cast<std::size_t>(pattern_.rows[e])];
-    (ball && rows == 3 ? solve_rows<3> : solve_rows<0>)(l, n, &values_[starts_[nodes_ + e]], rows);
-  }
+  int below = 0;  // rows, which follow each other: A L⁻ᵀ, and in the end A L⁻ᵀ D⁻¹
+  for (std::size_t e = begin; e < end; ++e) below += sizes_[static_cast<std::size_t>(pattern_.rows[e])];
+  auto* const rows_below = below > 0 ? reinterpret_cast<Sides<1>*>(&values_[starts_[nodes_ + begin]]) : nullptr;
+  for (int i = 0; i < below; ++i) (ball ? solve_lower<3, 1> : solve_lower<0, 1>)(l, n, rows_below + i * n);
   for (std::size_t a = begin; a < end; ++a)
     for (std::size_t b = a; b < end; ++b) {
       const std::int32_t to = pattern_.targets[target++];
@@ -276,10 +259,7 @@ void JointFactor::eliminate(std::size_t column) {
                                                                 &values_[starts_[nodes_ + a]], columns, l, n,
                                                                 &values_[starts_[static_cast<std::size_t>(to)]]);
     }
-  for (std::size_t e = begin; e < end; ++e) {
-    const int rows = sizes_[static_cast<std::size_t>(pattern_.rows[e])];
-    (ball && rows == 3 ? scale_rows<3> : scale_rows<0>)(l, n, &values_[starts_[nodes_ + e]], rows);
-  }
+  for (int i = 0; i < below; ++i) (ball ? scale<3, 1> : scale<0, 1>)(l, n, rows_below + i * n);
 }
 
 /// The product of two blocks of a column: its size goes to both diagonals.
