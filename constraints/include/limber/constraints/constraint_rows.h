@@ -38,9 +38,9 @@ struct RowSide {
 struct RowParameters {
   double gap = 0.0;            ///< when the row was made, for solvers that do not ask again
   double offset = 0.0;         ///< wanted gap at the step's end, in the gap's unit
-  double compliance = 0.0;     ///< ≥ 0, gap per impulse: a spring k with a damper c has 1/(Δt k + c)
   double lower = -kUnbounded;  ///< smallest impulse, ≤ upper; equality rows (−∞, ∞), contacts and limits (0, ∞)
   double upper = kUnbounded;  ///< largest impulse
+  double compliance = 0.0;    ///< ≥ 0, gap per impulse: a spring k with a damper c has 1/(Δt k + c)
   double tolerance = 1e-12;   ///< of the gap, in its unit; > 0
   double digits = 0.0;        ///< what of the gap is lost to the digits of what it is computed from, in its unit
   /// A static constraint: a joint, a stop, the ground. Its force under gravity and other held forces is found by
