@@ -50,6 +50,17 @@ inline to_chars_result to_chars(char* first, char* last, double value) {
   return {first + length, errc()};
 }
 
+// Errors are lines put together by +, which libc++ writes out anew at each place. These are chosen over its templates.
+#define LIMBER_OUT_OF_LINE [[gnu::noinline]] inline
+LIMBER_OUT_OF_LINE string operator+(string&& a, const char* b) { return std::move(a.append(b)); }
+LIMBER_OUT_OF_LINE string operator+(string&& a, const string& b) { return std::move(a.append(b)); }
+LIMBER_OUT_OF_LINE string operator+(string&& a, string&& b) { return std::move(a.append(b)); }
+LIMBER_OUT_OF_LINE string operator+(const string& a, const char* b) { return string(a) + b; }
+LIMBER_OUT_OF_LINE string operator+(const string& a, const string& b) { return string(a) + b; }
+LIMBER_OUT_OF_LINE string operator+(const char* a, const string& b) { return string(a) + b; }
+LIMBER_OUT_OF_LINE string operator+(const char* a, string&& b) { return std::move(b.insert(0, a)); }
+#undef LIMBER_OUT_OF_LINE
+
 /// Shell's sort: libc++ sorts by some 5 kB of code for each type, a ninth of the package.
 template <class I, class Less>
 requires random_access_iterator<I>
