@@ -162,7 +162,7 @@ bool opened(const std::string& page) { return exit_code_of("xdg-open", {page}) =
 void view(Program& program, const Arguments& arguments) {
   program.add_input(arguments.input);
   const PageContent content = content_of(program, arguments);
-  const std::string page = page_with(empty_page(), content, gzipped);
+  const std::string page = page_with(empty_page(!content.joints.empty()), content, gzipped);
   program.report()["files"] = content.files.size();
   program.report()["bytes"] = page.size();
   if (!arguments.page.empty()) {

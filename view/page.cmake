@@ -1,4 +1,4 @@
-# limber_page: the page without a scene as a constant, empty_page(). The engine is compiled by em++ in a
+# limber_page: the page without a scene, empty_page(). The engine is compiled by em++ in a
 # build tree of its own, the scripts are bundled by esbuild; all of it in the build tree.
 include(ExternalProject)
 
@@ -37,6 +37,7 @@ ExternalProject_Add(limber_page_engine
     -DLIMBER_WARNINGS_AS_ERRORS=OFF
   BUILD_COMMAND ${with_node_path} ${CMAKE_COMMAND} --build <BINARY_DIR> --target page_engine page_sound limber_npm
   BUILD_BYPRODUCTS ${page_engine}/page_engine.mjs ${page_engine}/page_engine.wasm ${page_engine}/page_sound.wasm
+    ${page_engine}/npm/package/posing.js ${page_engine}/npm/package/posing.wasm
   INSTALL_COMMAND ""
   BUILD_ALWAYS ON
   USES_TERMINAL_BUILD ON)
@@ -61,7 +62,7 @@ add_custom_command(OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/empty_page.cpp
   COMMAND ${LIMBER_NODE} build.mjs ${page_engine} ${CMAKE_CURRENT_BINARY_DIR}/empty_page.cpp
   WORKING_DIRECTORY ${page_web}
   DEPENDS ${page_copies} ${page_web}/node_modules/.installed ${page_engine}/page_engine.mjs ${page_engine}/page_engine.wasm
-          ${page_engine}/page_sound.wasm
+          ${page_engine}/page_sound.wasm ${page_engine}/npm/package/posing.js ${page_engine}/npm/package/posing.wasm
   COMMENT "The page without a scene")
 add_library(limber_page STATIC ${CMAKE_CURRENT_BINARY_DIR}/empty_page.cpp)
 add_dependencies(limber_page limber_page_engine)

@@ -1,5 +1,5 @@
 // node build.mjs ENGINE_FOLDER OUT.cpp: the page without a scene, all in one file, as a C++ constant. ENGINE_FOLDER has
-// page_engine.mjs, page_engine.wasm and page_sound.wasm; limber-view puts the files of a scene in the place of "@FILES@".
+// page_engine.mjs, page_engine.wasm, page_sound.wasm and npm/package; limber-view puts the files of a scene in the place of "@FILES@".
 import { createHash } from 'node:crypto';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
@@ -18,7 +18,8 @@ const bundle = await esbuild.build({
   bundle: true,
   format: 'iife',
   platform: 'browser',
-  alias: { 'page-engine': join(engine, 'page_engine.mjs') },
+  alias: { 'page-engine': join(engine, 'page_engine.mjs'), 'limber/posing': join(engine, 'npm', 'package', 'posing.js') },
+  logOverride: { 'empty-import-meta': 'silent' },  // where posing.wasm is, which the page has inside
   external: ['module', 'fs', 'path', 'url', 'crypto', 'worker_threads', 'ws'],  // what the engine asks Node for
 });
 const script = inElement(bundle), style = read(here, 'style.css');
@@ -34,14 +35,28 @@ const parts = {
   // none; from disk Chromium refuses worklets of blob:.
   WORKLET: inElement(await esbuild.build({ ...small, entryPoints: [join(here, 'sound_worklet.js')] })),
   SOUND: zipped('page_sound.wasm'),
-  ENGINE: zipped('page_engine.wasm'),
 };
 for (const text of Object.values(parts)) if (/<\/(script|style)/i.test(text)) throw new Error('a part of the page would end its element');
 const page = read(here, 'index.html').replace(/@([A-Z]+)@/g, (all, name) => parts[name] ?? all);
 
 // Pieces that every compiler takes, each by itself: an escape at the end of one must not run into the next.
-const pieces = [];
-for (let at = 0; at < page.length; at += 8000) pieces.push(`    R"~page~(${page.slice(at, at + 8000)})~page~"`);
-if (page.includes(')~page~"')) throw new Error('the page has what ends its constant');
-writeFileSync(out, `// Made by build.mjs.\n#include "empty_page.h"\n\nnamespace limber {\n\nstd::string_view empty_page() {\n` +
-  `  static constexpr char kPage[] =\n${pieces.join('\n')};\n  return {kPage, sizeof kPage - 1};\n}\n\n}  // namespace limber\n`);
+function constant(name, text) {
+  if (text.includes(')~page~"')) throw new Error('the page has what ends its constant');
+  const pieces = [];
+  for (let at = 0; at < text.length; at += 8000) pieces.push(`    R"~page~(${text.slice(at, at + 8000)})~page~"`);
+  return `constexpr char ${name}[] =\n${pieces.join('\n')};\n`;
+}
+const [before, after] = page.split('@ENGINE@');
+writeFileSync(out, `// Made by build.mjs.
+#include "empty_page.h"
+
+namespace limber {
+namespace {
+
+${constant('kBefore', before)}${constant('kAfter', after)}${constant('kEngine', zipped('page_engine.wasm'))}${constant('kPosing', zipped(join('npm', 'package', 'posing.wasm')))}
+}  // namespace
+
+std::string empty_page(bool poses) { return std::string(kBefore) + (poses ? kPosing : kEngine) + kAfter; }
+
+}  // namespace limber
+`);

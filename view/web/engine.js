@@ -1,10 +1,10 @@
 // The engine: WebAssembly behind plain functions, with texts and arrays copied out where they are to last.
 import makePageEngine from 'page-engine';
-import { fileOf, unzipped } from './unpack.js';
+import { fileOf } from './unpack.js';
 
-/** @param wasm compressed by gzip. @param files of the page (unpack.js), their paths below /scene/ */
+/** @param wasm bytes. @param files of the page (unpack.js), their paths below /scene/ */
 export async function openModule(wasm, files) {
-  const module = await makePageEngine({ wasmBinary: await unzipped(wasm), print() {}, printErr() {} });
+  const module = await makePageEngine({ wasmBinary: wasm, print() {}, printErr() {} });
   for (const file of files) {
     module.FS.mkdirTree(file.path.slice(0, file.path.lastIndexOf('/')));
     module.FS.writeFile(file.path, await fileOf(file));

@@ -1,14 +1,14 @@
 // The page: a scene that goes on in real time, and a person who reaches into it.
+import { load, Posing } from 'limber/posing';
 import { Engine, openModule } from './engine.js';
 import { download } from './dom.js';
 import { tell } from './message.js';
 import { Panel } from './panel.js';
 import { PoseApp } from './pose.js';
-import { PoseEngine } from './pose_engine.js';
 import { Original, standing } from './share.js';
 import { Sound } from './sound.js';
 import { Stage } from './stage.js';
-import { bytesOf } from './unpack.js';
+import { bytesOf, fileOf, unzipped } from './unpack.js';
 
 const MOST_STEPS_A_FRAME = 6;
 const LONGEST_FRAME = 100;  // ms, after which no other step begins: a heavy scene goes slower, and the page still answers
@@ -258,13 +258,20 @@ class App {
   }
 }
 
+/** @param wasm of limber/posing, bytes */
+async function openPosing(wasm, files, model, joints) {
+  const name = (path) => path.slice(path.lastIndexOf('/') + 1);
+  await load(wasm);
+  return Posing.open(Object.fromEntries(await Promise.all(files.map(async (file) => [name(file.path), await fileOf(file)]))), name(model), name(joints));
+}
+
 async function main() {
   const original = new Original();
   const stage = new Stage(document.getElementById('view'));
   stage.prepare();
   const { scene, joints, files, stands } = JSON.parse(document.getElementById('files').textContent);
-  const module = await openModule(bytesOf(document.getElementById('engine').textContent), files);
-  const engine = joints ? new PoseEngine(module, scene, joints) : new Engine(module, scene);
+  const wasm = await unzipped(bytesOf(document.getElementById('engine').textContent));
+  const engine = joints ? await openPosing(wasm, files, scene, joints) : new Engine(await openModule(wasm, files), scene);
   document.title = `${engine.scene.name} – limber`;
   const app = joints ? new PoseApp(engine, stage) : new App(engine, stage);
   if (!joints) {

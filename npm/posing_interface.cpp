@@ -1,4 +1,5 @@
-// Posing as plain C functions: what web/pose_engine.js calls. Texts and arrays as in page_interface.cpp.
+// Posing as plain C functions: what posing.js calls. Texts are UTF-8 and end with zero; arrays stay valid until the
+// next call. Functions that can fail return 0 and leave one line in pose_error().
 #include <exception>
 #include <memory>
 #include <string>
