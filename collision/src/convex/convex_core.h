@@ -1,6 +1,8 @@
 // Rigid convex shapes: hull of some points, and a radius around it.
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -28,6 +30,13 @@ struct ConvexCore {
 
   std::span<const Index> loop(const ConvexFace& f) const {
     return std::span(loops).subspan(static_cast<std::size_t>(f.first), static_cast<std::size_t>(f.count));
+  }
+  // How far it extends along a unit direction, from the origin.
+  double reach(const Vec3& along) const {
+    if (half_extents[0] > 0.0) return along.cwiseAbs().dot(half_extents) + radius;
+    double highest = -std::numeric_limits<double>::infinity();
+    for (const Vec3& p : points) highest = std::max(highest, along.dot(p));
+    return highest + radius;
   }
   // The mean of its points.
   Vec3 middle() const {

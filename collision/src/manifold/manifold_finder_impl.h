@@ -57,6 +57,12 @@ struct ManifoldFinder::Impl {
     Measured at;
     double lowest;
   };
+  /// A plane that a body touches along from in front, in one of its pairs: out · x ≥ offset, x from its origin, world.
+  struct Support {
+    Vec3 out;
+    double offset, lowest;  ///< the latter as that of a touch
+    std::size_t pair;
+  };
 
   // Of the query under way.
   ContactQuery query;
@@ -69,7 +75,9 @@ struct ManifoldFinder::Impl {
   struct {
     std::vector<std::size_t> pairs_of, first_pair_of;  ///< by body: of which pairs it is
     std::vector<Touch> touches;
-    std::vector<std::pair<std::size_t, std::size_t>> touches_of;  ///< by pair: first and end, once asked for
+    std::vector<Support> supports;
+    std::vector<std::pair<std::size_t, std::size_t>> touches_of;   ///< by pair: first and end, once asked for
+    std::vector<std::pair<std::size_t, std::size_t>> supports_of;  ///< by body, likewise
     std::vector<internal::SupportPlane> planes_a, planes_b;
     std::vector<Vec3> own_normals;  ///< of the pair whose planes are sought, into the body that they are sought for
   } seams;
@@ -113,6 +121,8 @@ struct ManifoldFinder::Impl {
   void level_seams();
   void list_touches(std::size_t pair, internal::ManifoldWorker& worker);
   std::span<const Touch> touches_of(std::size_t pair, internal::ManifoldWorker& worker);
+  void list_supports(Index body, internal::ManifoldWorker& worker);
+  std::span<const Support> supports_of(Index body, internal::ManifoldWorker& worker);
   bool touches_along(const Vec3& out) const;
   void list_pairs_of_bodies();
   void find_planes(std::size_t pair, Index body, internal::ManifoldWorker& worker,

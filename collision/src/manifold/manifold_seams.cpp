@@ -25,8 +25,9 @@ constexpr std::size_t kNotListed = std::numeric_limits<std::size_t>::max();
 /// farther, the plane is what both touch along. Manifolds made in this query are made again so, one after the other.
 void ManifoldFinder::Impl::level_seams() {
   bool listed = false;
-  seams.touches.clear();
+  seams.touches.clear(), seams.supports.clear();
   seams.touches_of.assign(pairs.size(), {kNotListed, kNotListed});
+  seams.supports_of.assign(bodies.size(), {kNotListed, kNotListed});
   const ManifoldWorkers::Lease worker(workers);
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const BodyPair& pair = pairs[p];
@@ -40,6 +41,7 @@ void ManifoldFinder::Impl::level_seams() {
     q.planes_a = seams.planes_a, q.planes_b = seams.planes_b;
     make(graph.at(p), q, *worker);
     list_touches(p, *worker);
+    for (const Index body : {pair.a, pair.b}) seams.supports_of[static_cast<std::size_t>(body)].first = kNotListed;
   }
 }
 
@@ -75,39 +77,53 @@ void ManifoldFinder::Impl::list_pairs_of_bodies() {
   seams.first_pair_of[0] = 0;
 }
 
-/// Planes, in the frame of a convex body of a pair, that it rests on or comes down on beside the other one, with more
-/// than half of itself in front, to which that one reaches, and along which not all of the pair's contacts are.
+std::span<const ManifoldFinder::Impl::Support> ManifoldFinder::Impl::supports_of(Index body, ManifoldWorker& worker) {
+  const auto& [first, end] = seams.supports_of[static_cast<std::size_t>(body)];
+  if (first == kNotListed) list_supports(body, worker);
+  return std::span(seams.supports).subspan(first, end - first);
+}
+
+/// Of a convex body that has more than half of itself in front; of the contacts of a face the lowest.
+void ManifoldFinder::Impl::list_supports(Index body, ManifoldWorker& worker) {
+  const double same_normal = internal::collision_tuning().manifold.same_normal;
+  const auto i = static_cast<std::size_t>(body);
+  seams.supports_of[i].first = seams.supports.size();
+  for (std::size_t k = seams.first_pair_of[i]; k < seams.first_pair_of[i + 1]; ++k) {
+    const std::size_t p = seams.pairs_of[k];
+    const bool is_a = pairs[p].a == body;
+    const std::size_t first = seams.supports.size();
+    for (const Touch& touch : touches_of(p, worker)) {
+      const Vec3 out = is_a ? touch.at.normal : Vec3(-touch.at.normal);
+      const double offset =
+          is_a ? out.dot(touch.at.p_b) : out.dot(touch.at.p_a + at(pairs[p].a).pose.p - at(body).pose.p);
+      const Support here{out, offset, touch.lowest, p};
+      if (seams.supports.size() == first ||
+          (out - seams.supports.back().out).squaredNorm() > same_normal * same_normal) {
+        if (reach(body, out) - reach(body, -out) >= 2.0 * offset) seams.supports.push_back(here);
+      } else if (touch.lowest < seams.supports.back().lowest) {
+        seams.supports.back() = here;
+      }
+    }
+  }
+  seams.supports_of[i].second = seams.supports.size();
+}
+
+/// Planes, in the frame of a convex body of a pair, that it rests on or comes down on beside the other one, to which
+/// that one reaches, and along which not all of the pair's contacts are.
 void ManifoldFinder::Impl::find_planes(std::size_t p, Index body, ManifoldWorker& worker,
                                        std::vector<internal::SupportPlane>& planes) {
   planes.clear();
   const Index other = pairs[p].a == body ? pairs[p].b : pairs[p].a;
   const ManifoldBody& me = at(body);
   if (me.core() == nullptr || at(other).half_space() != nullptr) return;
-  const double tolerance = options.flush * std::min(me.thickness, at(other).thickness),
-               same_normal = internal::collision_tuning().manifold.same_normal;
-  const auto i = static_cast<std::size_t>(body);
-  const auto out_of_other = [&](const Touch& touch, std::size_t of) {
-    return pairs[of].a == body ? touch.at.normal : Vec3(-touch.at.normal);
-  };
+  const double tolerance = options.flush * std::min(me.thickness, at(other).thickness);
   seams.own_normals.clear();
-  for (const Touch& touch : touches_of(p, worker)) seams.own_normals.push_back(out_of_other(touch, p));
-  for (std::size_t k = seams.first_pair_of[i]; k < seams.first_pair_of[i + 1]; ++k) {
-    const std::size_t beside = seams.pairs_of[k];
-    if (beside == p) continue;
-    Vec3 last = Vec3::Zero();
-    for (const Touch& touch : touches_of(beside, worker)) {
-      if (touch.lowest > tolerance) continue;
-      const Vec3 out = out_of_other(touch, beside);
-      if ((out - last).squaredNorm() <= same_normal * same_normal) continue;  // contacts of a face
-      last = out;
-      if (touches_along(out)) continue;
-      const double offset = pairs[beside].a == body ? out.dot(touch.at.p_b)
-                                                    : out.dot(touch.at.p_a + at(pairs[beside].a).pose.p - me.pose.p);
-      if (reach(body, out) - reach(body, -out) < 2.0 * offset) continue;  // its middle is behind
-      if (reaches_to(other, out, offset + out.dot(me.pose.p - at(other).pose.p), tolerance))
-        planes.push_back({me.turn.transpose() * out, offset, tolerance});
-    }
-  }
+  for (const Touch& touch : touches_of(p, worker))
+    seams.own_normals.push_back(pairs[p].a == body ? touch.at.normal : Vec3(-touch.at.normal));
+  for (const Support& support : supports_of(body, worker))
+    if (support.pair != p && support.lowest <= tolerance && !touches_along(support.out) &&
+        reaches_to(other, support.out, support.offset + support.out.dot(me.pose.p - at(other).pose.p), tolerance))
+      planes.push_back({me.turn.transpose() * support.out, support.offset, tolerance});
 }
 
 bool ManifoldFinder::Impl::touches_along(const Vec3& out) const {
@@ -125,12 +141,7 @@ bool ManifoldFinder::Impl::reaches_to(Index body, const Vec3& normal, double off
 
 /// How far a convex body reaches along a direction, from its origin.
 double ManifoldFinder::Impl::reach(Index body, const Vec3& along) const {
-  const internal::ConvexCore& core = *at(body).core();
-  const Vec3 along_B = at(body).turn.transpose() * along;
-  if (core.half_extents[0] > 0.0) return along_B.cwiseAbs().dot(core.half_extents) + core.radius;
-  double highest = -std::numeric_limits<double>::infinity();
-  for (const Vec3& p : core.points) highest = std::max(highest, along_B.dot(p));
-  return highest + core.radius;
+  return at(body).core()->reach(at(body).turn.transpose() * along);
 }
 
 }  // namespace limber
