@@ -71,10 +71,10 @@ struct SplitVolumes {
 // The simplex's point nearest to the origin; leaves only the vertices it depends on. All four are left, and the origin
 // itself is returned, where the origin is inside.
 Vec3 shrink_to_nearest(Simplex& s) {
-  if (s.size < 4) {
-    const std::array<std::size_t, 3> of{0, s.size > 1 ? std::size_t{1} : 0, s.size > 2 ? std::size_t{2} : 0};
-    return reduce_to(s, of, nearest_to_origin(s, of));
-  }
+  if (s.size < 3)
+    return reduce_to(s, {0, 1, 2},
+                     closest_on_segment(Vec3::Zero(), {s.vertices[0].point, s.vertices[s.size - 1].point}));
+  if (s.size == 3) return reduce_to(s, {0, 1, 2}, nearest_to_origin(s, {0, 1, 2}));
   constexpr std::array<std::array<std::size_t, 3>, 4> kFaces{{{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}}};
   const SplitVolumes volumes(s);
   bool inside = true;
@@ -128,7 +128,7 @@ ConvexDistance intersecting(const Vec3& common, double radii) { return {common, 
 
 }  // namespace
 
-ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b) {
+ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b, double most) {
   const double radii = a.radius + b.radius;
   Simplex simplex;
   simplex.vertices[simplex.size++] = {a.points[0] - b.points[0], 0, 0};
@@ -139,6 +139,11 @@ ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b) {
     if (squared == 0.0) return intersecting(a.points[simplex.vertices[0].a], radii);
     Vertex next{Vec3::Zero(), farthest(a.points, -nearest), farthest(b.points, nearest)};
     next.point = a.points[next.a] - b.points[next.b];
+    const double apart = nearest.dot(next.point) - radii * std::sqrt(squared);
+    if (apart > 0.0 && apart * apart > most * most * squared) {
+      const Vec3 n = nearest.normalized();
+      return {a.points[next.a] - a.radius * n, b.points[next.b] + b.radius * n, n, apart / std::sqrt(squared), false};
+    }
     if (simplex.has(next) || squared - nearest.dot(next.point) <= tuning.gjk_progress * squared) break;
     Simplex larger = simplex;
     larger.vertices[larger.size++] = next;

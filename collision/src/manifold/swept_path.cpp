@@ -101,20 +101,35 @@ ImpactTime SweptPath::touch_of_cores(double left, double least) {
   using Status = ImpactTime::Status;
   const ConvexCore &a = *pair_->a.core(), &b = *pair_->b.core();
   const int most = collision_tuning().impact.looks_on_the_way;
+  if (pass_beside(left)) return {Status::kNone, left, 0};
   double margin = margin_, t = 0.0;
   for (int n = 1; n <= most; ++n) {
     const ConvexDistance d =
         distance({sides_[0].points_after(t, a), a.radius}, {sides_[1].points_after(t, b), b.radius});
     while (t == 0.0 && d.distance <= margin && 0.5 * margin >= least) margin *= 0.5;
     if (d.distance <= margin) return {t == 0.0 ? Status::kTouching : Status::kImpact, t, n};
-    double closing = -d.normal.dot(way());
-    closing += d.normal.cross(sides_[0].state.rotation).norm() * pair_->a.radius;
-    closing += d.normal.cross(sides_[1].state.rotation).norm() * pair_->b.radius;
+    const double closing = turning_towards(d.normal) - d.normal.dot(way());
     const double open = d.distance - collision_tuning().impact.kept_gap * margin;
     if (!(closing * (left - t) > open)) return {Status::kNone, left, n};
     t += open / closing;
   }
   return {Status::kResting, t, most};
+}
+
+/// How far points come along a direction, at most, as the bodies turn through what is left.
+double SweptPath::turning_towards(const Vec3& normal) const {
+  return normal.cross(sides_[0].state.rotation).norm() * pair_->a.radius +
+         normal.cross(sides_[1].state.rotation).norm() * pair_->b.radius;
+}
+
+/// Whether a plane along the way keeps two convex shapes apart.
+bool SweptPath::pass_beside(double left) const {
+  const RigidTransform &X_WA = sides_[0].state.pose, &X_WB = sides_[1].state.pose;
+  const Vec3 along = way().normalized(), between = X_WA.p - X_WB.p;
+  const Vec3 normal = (between - along.dot(between) * along).normalized();
+  const double gap = normal.dot(between) - pair_->a.core()->reach(X_WA.q.conjugate() * -normal) -
+                     pair_->b.core()->reach(X_WB.q.conjugate() * normal);
+  return turning_towards(normal) * left <= gap - collision_tuning().impact.kept_gap * margin_;
 }
 
 Vec3 SweptPath::way() const { return sides_[0].state.displacement - sides_[1].state.displacement; }

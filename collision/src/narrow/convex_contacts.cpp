@@ -173,8 +173,9 @@ bool ConvexContacts::faces_tell(double margin) {
 }
 
 void ConvexContacts::find_by_distance(double margin) {
-  const ConvexDistance nearest = distance(solid(side_[0].points), solid(side_[1].points));
-  if (!(nearest.distance - side_[0].core->radius - side_[1].core->radius <= margin)) return;
+  const double most = margin + side_[0].core->radius + side_[1].core->radius;
+  const ConvexDistance nearest = distance(solid(side_[0].points), solid(side_[1].points), most);
+  if (!(nearest.distance <= most)) return;
   // Cores that are apart by little more than round-off may have any normal by their nearest points.
   if (nearest.cores_intersect || !(depth_along(nearest.normal) < 0.0)) {
     touch(least_penetration(), nullptr, margin);

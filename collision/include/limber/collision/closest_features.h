@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <span>
 
 #include "limber/core/types.h"
@@ -59,6 +60,9 @@ struct ConvexDistance {
 
 /// By GJK with exact solves over the simplices, ended by the closest points of the two features found. Gap within 1e-12
 /// of size, normal within 1e-12·size/gap.
-ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b);
+/// @param most of solids farther apart, any distance above it that a plane with this normal keeps them apart by may be
+/// told; m, ≥ 0
+ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b,
+                        double most = std::numeric_limits<double>::infinity());
 
 }  // namespace limber
