@@ -40,7 +40,7 @@ double approach(const BodyStates& states, const PreparedContact& contact, const 
   for (std::size_t s = 0; s < 2; ++s) {
     const PreparedSide& side = contact.side(s);
     if (states.is_static(side.body)) continue;
-    speed -= PreparedContact::sign(s) * n.dot(side.motion(states).velocity);
+    speed -= PreparedContact::sign(s) * n.dot(side.velocity(states));
     gain -= PreparedContact::sign(s) * acceleration(states, side, n, gravity);
   }
   if (speed < 0.0 && gain <= 0.0) return 0.0;

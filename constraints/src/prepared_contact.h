@@ -23,11 +23,6 @@ inline Vec3 turn_of_step(const BodyStates& states, Index body, double step) {
   return turn + rotation_vector(turned * quaternion_from_rotation_vector(-turn));
 }
 
-/// A material point at the step's start; `bias` is its acceleration if the body keeps its velocities.
-struct PointMotion {
-  Vec3 place, velocity, bias;
-};
-
 /// The share of a contact's force that a vertex of the collision surface takes.
 struct VertexShare {
   Index vertex = -1;
@@ -67,17 +62,13 @@ struct PreparedSide {
   Vec3 deforming(std::span<const double> z, std::span<const double> rates) const {
     return shape(z).velocity(at, rates);
   }
-  /// Of the point that the body carries along: of what is round the centre. The bias is ω × (ω × p) + 2 ω × R J ż,
-  /// [H03] equation 20; what J itself changes by is left out.
-  PointMotion motion(const BodyStates& states) const {
-    const RigidTransform& X = states.pose(body, StepTime::kStart);
-    const Vec3 omega = states.angular_velocity(body, StepTime::kStart), centre = X * start_point;
-    const Vec3 turning = omega.cross(centre - X.p);
-    Vec3 bending = Vec3::Zero();
-    if (model != nullptr)
-      bending = X.q * deforming(states.amplitudes(body, StepTime::kStart), states.rates(body, StepTime::kStart));
-    return {centre, states.velocity(body, StepTime::kStart) + turning + bending,
-            omega.cross(turning) + 2.0 * omega.cross(bending)};
+  /// At the step's start, world, of the point that the body carries along: of what is round the centre.
+  Vec3 velocity(const BodyStates& states) const {
+    constexpr StepTime kStart = StepTime::kStart;
+    const Quaternion& q = states.pose(body, kStart).q;
+    Vec3 v = states.velocity(body, kStart) + states.angular_velocity(body, kStart).cross(q * start_point);
+    if (model != nullptr) v += q * deforming(states.amplitudes(body, kStart), states.rates(body, kStart));
+    return v;
   }
 };
 

@@ -30,6 +30,15 @@ Vec3 turn_of_normal(const BodyStates& states, const PreparedContact& contact) {
                           : Vec3(Vec3::Zero());
 }
 
+/// The acceleration of the point that a side's body carries along, if the body keeps its velocities: ω × (ω × p) +
+/// 2 ω × R J ż, [H03] equation 20; what J itself changes by is left out.
+Vec3 bias_of(const BodyStates& states, const PreparedSide& side) {
+  const Vec3 omega = states.angular_velocity(side.body, StepTime::kStart);
+  const Vec3 relative = side.velocity(states) - states.velocity(side.body, StepTime::kStart);
+  const Vec3 turning = omega.cross(states.pose(side.body, StepTime::kStart).q * side.start_point);
+  return omega.cross(2.0 * relative - turning);
+}
+
 }  // namespace
 
 const ExactMotion* FreeMotions::of(Index body) const {
@@ -87,11 +96,13 @@ double TouchTimes::touch(const BodyStates& states, const FreeMotions& motions, c
 void bias_accelerations(const PairContacts& contacts, const BodyStates& states, std::span<double> bias) {
   std::size_t row = 0;
   for (const PreparedContact& contact : contacts.contacts()) {
-    const PointMotion a = contact.a.motion(states), b = contact.b.motion(states);
-    const Vec3 n = contact.axes.col(0), turn = turn_of_normal(states, contact);
+    const PreparedSide &a = contact.a, &b = contact.b;
+    const Vec3 n = contact.axes.col(0), turn = turn_of_normal(states, contact),
+               bias_ab = bias_of(states, a) - bias_of(states, b);
+    const Vec3 apart = a.start_position(states) - a.rim - (b.start_position(states) - b.rim);
     for (Index axis = 0; axis < contact.rows(); ++axis)
-      bias[row + static_cast<std::size_t>(axis)] = contact.axes.col(axis).dot(a.bias - b.bias);
-    bias[row] += 2.0 * turn.dot(a.velocity - b.velocity) - turn.squaredNorm() * n.dot(a.place - b.place);
+      bias[row + static_cast<std::size_t>(axis)] = contact.axes.col(axis).dot(bias_ab);
+    bias[row] += 2.0 * turn.dot(a.velocity(states) - b.velocity(states)) - turn.squaredNorm() * n.dot(apart);
     row += static_cast<std::size_t>(contact.rows());
   }
 }
