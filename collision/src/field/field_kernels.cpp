@@ -142,12 +142,13 @@ HWY_ATTR void MultiplyRows(const float* rest, const float* U, std::size_t tiles,
   }
 }
 
-HWY_ATTR float LargestLength(const float* clusters, std::size_t count) {
+HWY_ATTR float LargestDistance(const float* clusters, const float* others, std::size_t count) {
   const Floats d;
   F most = hn::Zero(d);
   for (std::size_t c = 0; c < count; ++c)
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
-      const Points v = LoadCluster(clusters + c * kClusterFloats, lane);
+      const Points v = Difference(LoadCluster(clusters + c * kClusterFloats, lane),
+                                  LoadCluster(others + c * kClusterFloats, lane));
       most = hn::Max(most, Dot(v, v));
     }
   return std::sqrt(hn::GetLane(hn::MaxOfLanes(d, most)));
@@ -231,7 +232,7 @@ HWY_AFTER_NAMESPACE();
 namespace limber::internal {
 
 HWY_EXPORT(MultiplyRows);
-HWY_EXPORT(LargestLength);
+HWY_EXPORT(LargestDistance);
 HWY_EXPORT(LargestMagnitudes);
 HWY_EXPORT(Lowest);
 HWY_EXPORT(BoxOfClusters);
@@ -244,8 +245,8 @@ void multiply_rows(const float* rest, const float* U, std::size_t tiles, std::si
   HWY_DYNAMIC_DISPATCH(MultiplyRows)(rest, U, tiles, modes, z, out, bodies);
 }
 
-float largest_length(const float* clusters, std::size_t count) {
-  return HWY_DYNAMIC_DISPATCH(LargestLength)(clusters, count);
+float largest_distance(const float* clusters, const float* others, std::size_t count) {
+  return HWY_DYNAMIC_DISPATCH(LargestDistance)(clusters, others, count);
 }
 
 void largest_magnitudes(const float* points, std::size_t count, float largest[3]) {

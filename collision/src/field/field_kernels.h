@@ -124,8 +124,8 @@ inline constexpr std::size_t kBodiesAtOnce = 4;
 void multiply_rows(const float* rest, const float* U, std::size_t tiles, std::size_t modes, const float* const* z,
                    float* const* out, std::size_t bodies);
 
-/// The largest |v| of the points of `count` clusters.
-float largest_length(const float* clusters, std::size_t count);
+/// The largest distance of a point of `count` clusters from that of the others.
+float largest_distance(const float* clusters, const float* others, std::size_t count);
 
 /// The largest |v| of each axis over `count` points xyz xyz …
 void largest_magnitudes(const float* points, std::size_t count, float largest[3]);

@@ -280,6 +280,13 @@ void DeformedPointshell::set_amplitudes(std::span<const double> z, std::span<con
   }
 }
 
+void DeformedPointshell::restore(std::span<const double> z, double bent) {
+  set_amplitudes(z);
+  DeformedPointshell* const self = this;
+  deform_together({&self, 1});
+  bent_ = bent;
+}
+
 ShellView DeformedPointshell::view() const {
   const Pointshell& s = *shell_;
   const float* radii = s.modes() > 0 ? radii_.data() : s.radius_.data();
@@ -337,8 +344,12 @@ void DeformedPointshell::deform_together(std::span<DeformedPointshell* const> bo
     x[b] = bodies[b]->own_.data(), radii[b] = bodies[b]->radii_.data();
   }
   const std::size_t first = s.lattice_rows_;
+  for (DeformedPointshell* body : bodies) std::copy_n(body->own_.data(), s.none_.size(), body->swings_.data());
   multiply_rows(s.rest_.data(), s.U_.data(), first / kRowTile, k, z, x, bodies.size());
   multiply_rows(s.radius_.data(), s.spread_.data(), s.radius_.size() / kRowTile, k, magnitudes, radii, bodies.size());
+  const std::size_t clusters = s.sample_clusters_.count;
+  for (DeformedPointshell* body : bodies)
+    body->bent_ += static_cast<double>(largest_distance(body->own_.data(), body->swings_.data(), clusters));
   std::size_t swinging = 0;
   const float* changes[kBodiesAtOnce] = {};
   float* swings[kBodiesAtOnce] = {};
@@ -347,7 +358,7 @@ void DeformedPointshell::deform_together(std::span<DeformedPointshell* const> bo
       changes[swinging] = body->amplitudes_.data() + 2 * k, swings[swinging++] = body->swings_.data();
   multiply_rows(s.none_.data(), s.U_.data(), s.none_.size() / kRowTile, k, changes, swings, swinging);
   for (DeformedPointshell* body : bodies)
-    if (body->swings_about_) body->largest_swing_ = largest_length(body->swings_.data(), s.sample_clusters_.count);
+    if (body->swings_about_) body->largest_swing_ = largest_distance(body->swings_.data(), s.none_.data(), clusters);
   // Displacements of the space about a body are for those that are bent by enough.
   std::size_t bent = 0;
   for (DeformedPointshell* body : bodies) {

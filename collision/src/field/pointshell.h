@@ -122,6 +122,10 @@ class DeformedPointshell {
     return {u[0], u[kFieldLanes], u[2 * kFieldLanes]};
   }
   float largest_swing() const { return largest_swing_; }  ///< of any vertex, m
+  /// How far bending has taken any point of the surface in all deform()s so far, at most: the length of a way, m.
+  double bent() const { return bent_; }
+  /// Back to the state that it was in after a deform(), @pre of a modal body
+  void restore(std::span<const double> z, double bent);
   /// Encloses the surface, body frame.
   const Vec3f& low() const { return low_; }
   const Vec3f& high() const { return high_; }
@@ -148,6 +152,7 @@ class DeformedPointshell {
   const float* coordinates_ = nullptr;
   Vec3f low_ = Vec3f::Zero(), high_ = Vec3f::Zero();
   float flex_ = 0.0f, largest_swing_ = 0.0f;
+  double bent_ = 0.0;
   bool swings_about_ = false;  ///< some amplitude is expected to change
   bool carries_back_ = false;  ///< the lattice's displacements are known, and long beside a cell
 };

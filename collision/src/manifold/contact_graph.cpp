@@ -38,18 +38,12 @@ LivePair& ContactGraph::append(const BodyPair& pair) {
   return slots_[known_.back().slot];
 }
 
-void ContactGraph::reserve(Index modes) {
-  modes_ = std::max(modes_, static_cast<std::size_t>(modes));
-  for (LivePair& pair : slots_) pair.amplitudes.reserve(2 * modes_);
-}
-
 std::uint32_t ContactGraph::take() {
   if (free_.empty()) {
     const std::size_t more = 8 + slots_.size() / 4;  // a few to spare
     for (std::size_t i = 0; i < more; ++i) free_.push_back(static_cast<std::uint32_t>(slots_.size() + more - 1 - i));
     slots_.resize(slots_.size() + more);
     free_.reserve(slots_.size());
-    reserve(static_cast<Index>(modes_));
   }
   const std::uint32_t slot = free_.back();
   free_.pop_back();

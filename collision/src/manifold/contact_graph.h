@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -32,23 +33,21 @@ struct KeptPoint {
 };
 
 struct LivePair {
-  bool known = false;                ///< a manifold was made
-  RigidTransform X_LS{};             ///< then: the smaller body in the frame of the larger one
-  double reach = 0.0;                ///< gaps up to here were asked for, m
-  Vec3 parting = Vec3::Zero();       ///< of pairs by fields, see FieldMotion; zero: not looked for yet
-  std::vector<double> amplitudes{};  ///< of a, then of b
-  std::vector<KeptPoint> points{};   ///< ascending in id
+  bool known = false;               ///< a manifold was made
+  RigidTransform X_LS{};            ///< then: the smaller body in the frame of the larger one
+  double reach = 0.0;               ///< gaps up to here were asked for, m
+  Vec3 parting = Vec3::Zero();      ///< of pairs by fields, see FieldMotion; zero: not looked for yet
+  std::array<double, 2> bent{};     ///< how far a and b had bent until then
+  std::vector<KeptPoint> points{};  ///< ascending in id
 
   template <class Self>
   static auto state_fields(Self& s) {
-    return std::tie(s.known, s.X_LS, s.reach, s.parting, s.amplitudes, s.points);
+    return std::tie(s.known, s.X_LS, s.reach, s.parting, s.bent, s.points);
   }
 };
 
 class ContactGraph {
  public:
-  /// Bodies of so many modes may come.
-  void reserve(Index modes);
   /// Finds or makes the pairs of a query, ascending; others are near no more.
   void match(std::span<const BodyPair> pairs);
   std::size_t size() const { return matched_.size(); }
@@ -80,7 +79,6 @@ class ContactGraph {
   void give_back(std::uint32_t slot);
 
   std::unique_ptr<ListRoom<KeptPoint, 4>> room_ = std::make_unique<ListRoom<KeptPoint, 4>>();
-  std::size_t modes_ = 0;
   std::vector<LivePair> slots_;
   std::vector<std::uint32_t> free_, matched_;
   std::vector<Entry> known_, next_;  // ascending

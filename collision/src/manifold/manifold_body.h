@@ -2,10 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "convex/convex_core.h"
 #include "finder/geometry_cache.h"
@@ -46,13 +49,26 @@ struct ManifoldBody {
   std::optional<InnerBall> inner{};      ///< none: the shape holds no ball that is known
   double thickness = 0.0, radius = 0.0;  ///< thickness_of() its box at rest; farthest point from the origin, m
 
+  /// How far bending may have taken any of its points in all queries so far, where no field tells it, m.
+  double bent = 0.0;
+
   // As it was placed for the last query.
+  std::vector<double> amplitudes{};  ///< of a modal one
   bool placed_asleep = false;
   RigidTransform pose{};
   Mat3 turn = Mat3::Identity();
   Vec3 displacement = Vec3::Zero();
   double reach = 0.0;
 
+  /// Goes on to new amplitudes. A skin may be anywhere then.
+  void bend(std::span<const double> z) {
+    for (std::size_t i = 0; i < z.size(); ++i) {
+      const double change = std::abs(z[i] - amplitudes[i]);
+      const bool skin = modal->surface->skin() != nullptr && change > 0.0;
+      bent += skin ? 2.0 * radius : change * modal->surface->largest_shape(static_cast<Index>(i));
+      amplitudes[i] = z[i];
+    }
+  }
   Index modes() const { return modal ? modal->surface->modes() : 0; }
   const ConvexCore* core() const { return rigid && !rigid->core.points.empty() ? &rigid->core : nullptr; }
   const HalfSpace* half_space() const { return rigid ? std::get_if<HalfSpace>(rigid->shape.get()) : nullptr; }

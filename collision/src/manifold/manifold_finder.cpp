@@ -51,9 +51,11 @@ void ManifoldFinder::Impl::make_boxes(Jobs& jobs) {
                         ManifoldBody& body = at(placing.bodies[i]);
                         const BodyState& s = state(placing.bodies[i]);
                         if (body.half_space() != nullptr) continue;
-                        if (body.modal)
+                        if (body.modal) {
                           internal::bind_state("ManifoldFinder", placing.bodies[i], (*worker).root, body.modal->surface,
                                                s.amplitudes);
+                          body.bend(s.amplitudes);
+                        }
                         Aabb& box = placing.boxes[i];
                         if (body.modal && fields.has(placing.bodies[i]) && std::isfinite(s.doubt)) {
                           box = swept_box(placing.bodies[i]);
@@ -225,7 +227,7 @@ void ManifoldFinder::add_body(Index body, const BodyGeometry& geometry, const Co
   else if (fresh.core())
     fresh.inner = internal::inner_ball(*fresh.core());
   fresh.radius = fresh.half_space() ? kInfinity : internal::farthest_of(box);
-  m.graph.reserve(fresh.modes());
+  fresh.amplitudes.assign(static_cast<std::size_t>(fresh.modes()), 0.0);
   m.bodies.add(body, std::move(fresh), filter);
   m.fields.add_body(body, m.at(body));
 }
@@ -243,6 +245,9 @@ void ManifoldFinder::exclude_pair(Index a, Index b, bool excluded) { impl_->bodi
 void ManifoldFinder::save_state(StateWriter& state) const {
   state(static_cast<std::uint64_t>(impl_->graph.living()));
   impl_->graph.for_each([&](const BodyPair& pair, const LivePair& live) { state(pair.a, pair.b, live); });
+  for (std::size_t i = 0; i < impl_->bodies.size(); ++i)
+    if (const auto index = static_cast<Index>(i); impl_->at(index).modal)
+      state(impl_->bent(index)), state.numbers(impl_->at(index).amplitudes);
 }
 
 void ManifoldFinder::restore_state(StateReader& state) {
@@ -251,6 +256,14 @@ void ManifoldFinder::restore_state(StateReader& state) {
     const auto a = state.read<Index>();
     const auto b = state.read<Index>();
     state(impl_->graph.append({a, b}));
+  }
+  for (std::size_t i = 0; i < impl_->bodies.size(); ++i) {
+    const auto index = static_cast<Index>(i);
+    ManifoldBody& body = impl_->at(index);
+    if (!body.modal) continue;
+    body.bent = state.read<double>();
+    state.numbers(body.amplitudes);
+    if (impl_->fields.has(index)) impl_->fields.restore(index, body.amplitudes, body.bent);
   }
   impl_->bodies.forget_places();
 }

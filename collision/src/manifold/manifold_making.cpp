@@ -65,14 +65,7 @@ bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const
   const double farthest = this->farthest(q);
   if (!pair.known || (q.by_fields ? q.expected.near > pair.reach : q.reach > pair.reach + farthest)) return false;
   if (!q.by_fields && !hardly_moved(q, pair.X_LS, q.X_LS)) return false;
-  double bent = 0.0;
-  const double* z = pair.amplitudes.data();
-  for (const auto& [body, amplitudes] : {std::pair(&q.a, q.state_a.amplitudes), std::pair(&q.b, q.state_b.amplitudes)})
-    for (std::size_t i = 0; i < amplitudes.size(); ++i) {
-      const double change = std::abs(amplitudes[i] - *z++);
-      if (body->modal->surface->skin() != nullptr && change > 0.0) return false;
-      bent += change * body->modal->surface->largest_shape(static_cast<Index>(i));
-    }
+  const double bent = this->bent(q.index_a) - pair.bent[0] + this->bent(q.index_b) - pair.bent[1];
   return q.by_fields ? way(q, pair.X_LS, q.X_LS) + bent + comes(q) <= slack(q) : bent <= farthest;
 }
 
@@ -130,10 +123,7 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   pair.known = kept;
   pair.X_LS = q.X_LS;
   pair.reach = q.by_fields ? q.expected.near : q.reach;
-  pair.amplitudes.clear();
-  if (!kept) return;  // nothing asks for them
-  pair.amplitudes.assign(q.state_a.amplitudes.begin(), q.state_a.amplitudes.end());
-  pair.amplitudes.insert(pair.amplitudes.end(), q.state_b.amplitudes.begin(), q.state_b.amplitudes.end());
+  pair.bent = {bent(q.index_a), bent(q.index_b)};
 }
 
 /// Adds the contacts of all places where two bodies come to touch on their way.
