@@ -147,8 +147,8 @@ HWY_ATTR float LargestDistance(const float* clusters, const float* others, std::
   F most = hn::Zero(d);
   for (std::size_t c = 0; c < count; ++c)
     for (std::size_t lane = 0; lane < kFieldLanes; lane += kLanes) {
-      const Points v = Difference(LoadCluster(clusters + c * kClusterFloats, lane),
-                                  LoadCluster(others + c * kClusterFloats, lane));
+      const Points v =
+          Difference(LoadCluster(clusters + c * kClusterFloats, lane), LoadCluster(others + c * kClusterFloats, lane));
       most = hn::Max(most, Dot(v, v));
     }
   return std::sqrt(hn::GetLane(hn::MaxOfLanes(d, most)));
