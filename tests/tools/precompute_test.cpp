@@ -374,7 +374,8 @@ TEST_F(Precompute, SoundIsBakedOnDemandToldAndHeard) {
   EXPECT_EQ(heard["frequencies_hz"], silent["frequencies_hz"]);
   const Json& sound = heard["bodies"][0]["sound"];
   EXPECT_EQ(sound["modes"], sound["audible"]);
-  EXPECT_EQ(sound["frequencies_hz"][0], heard["frequencies_hz"][0]);
+  const auto lowest = heard["frequencies_hz"][0].get<double>();  // of another solve, for other modes
+  EXPECT_NEAR(sound["frequencies_hz"][0].get<double>(), lowest, 1e-12 * lowest);
   EXPECT_GT(sound["frequencies_hz"][1], 10e3);
   EXPECT_LT(sound["frequencies_hz"][1], 20e3);
   EXPECT_NEAR(sound["loss_factors"][1].get<double>(), 0.0013, 1e-12);
