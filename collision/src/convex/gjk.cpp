@@ -139,11 +139,9 @@ ConvexDistance distance(const ConvexSolid& a, const ConvexSolid& b, double most)
     if (squared == 0.0) return intersecting(a.points[simplex.vertices[0].a], radii);
     Vertex next{Vec3::Zero(), farthest(a.points, -nearest), farthest(b.points, nearest)};
     next.point = a.points[next.a] - b.points[next.b];
-    const double apart = nearest.dot(next.point) - radii * std::sqrt(squared);
-    if (apart > 0.0 && apart * apart > most * most * squared) {
-      const Vec3 n = nearest.normalized();
-      return {a.points[next.a] - a.radius * n, b.points[next.b] + b.radius * n, n, apart / std::sqrt(squared), false};
-    }
+    const Vec3 n = nearest / std::sqrt(squared);
+    if (const double apart = n.dot(next.point) - radii; apart > most)
+      return {a.points[next.a] - a.radius * n, b.points[next.b] + b.radius * n, n, apart, false};
     if (simplex.has(next) || squared - nearest.dot(next.point) <= tuning.gjk_progress * squared) break;
     Simplex larger = simplex;
     larger.vertices[larger.size++] = next;
