@@ -36,11 +36,11 @@ class FieldPairs {
     const auto& shell = entries_[static_cast<std::size_t>(body)].shell;
     return shell ? static_cast<double>(shell->largest_swing()) : 0.0;
   }
-  double bent(Index body) const { return entries_[static_cast<std::size_t>(body)].shell->bent(); }
-  /// See DeformedPointshell. @pre has()
-  void restore(Index body, std::span<const double> z, double bent) {
-    entries_[static_cast<std::size_t>(body)].shell->restore(z, bent);
+  // See DeformedPointshell. @pre has()
+  double last_bend(Index body) const {
+    return static_cast<double>(entries_[static_cast<std::size_t>(body)].shell->last_bend());
   }
+  void restore(Index body, std::span<const double> z) { entries_[static_cast<std::size_t>(body)].shell->restore(z); }
   Vec3 place(Index body, const FeatureSide& side) const;
   /// What the expected motion and a fall close of a contact's gap, m. @param points, normal in the frames of a, b and a
   double closing(const PairQuery& query, const FeatureContact& contact) const;

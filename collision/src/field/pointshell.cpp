@@ -280,11 +280,10 @@ void DeformedPointshell::set_amplitudes(std::span<const double> z, std::span<con
   }
 }
 
-void DeformedPointshell::restore(std::span<const double> z, double bent) {
+void DeformedPointshell::restore(std::span<const double> z) {
   set_amplitudes(z);
   DeformedPointshell* const self = this;
   deform_together({&self, 1});
-  bent_ = bent;
 }
 
 ShellView DeformedPointshell::view() const {
@@ -349,7 +348,7 @@ void DeformedPointshell::deform_together(std::span<DeformedPointshell* const> bo
   multiply_rows(s.radius_.data(), s.spread_.data(), s.radius_.size() / kRowTile, k, magnitudes, radii, bodies.size());
   const std::size_t clusters = s.sample_clusters_.count;
   for (DeformedPointshell* body : bodies)
-    body->bent_ += static_cast<double>(largest_distance(body->own_.data(), body->swings_.data(), clusters));
+    body->last_bend_ = largest_distance(body->own_.data(), body->swings_.data(), clusters);
   std::size_t swinging = 0;
   const float* changes[kBodiesAtOnce] = {};
   float* swings[kBodiesAtOnce] = {};

@@ -122,10 +122,9 @@ class DeformedPointshell {
     return {u[0], u[kFieldLanes], u[2 * kFieldLanes]};
   }
   float largest_swing() const { return largest_swing_; }  ///< of any vertex, m
-  /// How far bending has taken any point of the surface in all deform()s so far, at most: the length of a way, m.
-  double bent() const { return bent_; }
-  /// Back to the state that it was in after a deform(), @pre of a modal body
-  void restore(std::span<const double> z, double bent);
+  float last_bend() const { return last_bend_; }          ///< how far the last deform() took any vertex, m
+  /// Back to the state that it was in after a deform(). @pre of a modal body
+  void restore(std::span<const double> z);
   /// Encloses the surface, body frame.
   const Vec3f& low() const { return low_; }
   const Vec3f& high() const { return high_; }
@@ -151,8 +150,7 @@ class DeformedPointshell {
   AlignedArray<float> amplitudes_;            ///< then their magnitudes, then how they are expected to change
   const float* coordinates_ = nullptr;
   Vec3f low_ = Vec3f::Zero(), high_ = Vec3f::Zero();
-  float flex_ = 0.0f, largest_swing_ = 0.0f;
-  double bent_ = 0.0;
+  float flex_ = 0.0f, largest_swing_ = 0.0f, last_bend_ = 0.0f;
   bool swings_about_ = false;  ///< some amplitude is expected to change
   bool carries_back_ = false;  ///< the lattice's displacements are known, and long beside a cell
 };

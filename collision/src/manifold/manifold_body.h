@@ -49,7 +49,7 @@ struct ManifoldBody {
   std::optional<InnerBall> inner{};      ///< none: the shape holds no ball that is known
   double thickness = 0.0, radius = 0.0;  ///< thickness_of() its box at rest; farthest point from the origin, m
 
-  /// How far bending may have taken any of its points in all queries so far, where no field tells it, m.
+  /// How far bending may have taken any of its points in all queries so far: the length of a way, m.
   double bent = 0.0;
 
   // As it was placed for the last query.
@@ -60,14 +60,15 @@ struct ManifoldBody {
   Vec3 displacement = Vec3::Zero();
   double reach = 0.0;
 
-  /// Goes on to new amplitudes. A skin may be anywhere then.
-  void bend(std::span<const double> z) {
+  /// How far new amplitudes take any of its points at most, m. A skin may be anywhere then.
+  double largest_bend(std::span<const double> z) const {
+    double sum = 0.0;
     for (std::size_t i = 0; i < z.size(); ++i) {
       const double change = std::abs(z[i] - amplitudes[i]);
       const bool skin = modal->surface->skin() != nullptr && change > 0.0;
-      bent += skin ? 2.0 * radius : change * modal->surface->largest_shape(static_cast<Index>(i));
-      amplitudes[i] = z[i];
+      sum += skin ? 2.0 * radius : change * modal->surface->largest_shape(static_cast<Index>(i));
     }
+    return sum;
   }
   Index modes() const { return modal ? modal->surface->modes() : 0; }
   const ConvexCore* core() const { return rigid && !rigid->core.points.empty() ? &rigid->core : nullptr; }

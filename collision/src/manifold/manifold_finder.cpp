@@ -54,7 +54,9 @@ void ManifoldFinder::Impl::make_boxes(Jobs& jobs) {
                         if (body.modal) {
                           internal::bind_state("ManifoldFinder", placing.bodies[i], (*worker).root, body.modal->surface,
                                                s.amplitudes);
-                          body.bend(s.amplitudes);
+                          body.bent += fields.has(placing.bodies[i]) ? fields.last_bend(placing.bodies[i])
+                                                                     : body.largest_bend(s.amplitudes);
+                          std::ranges::copy(s.amplitudes, body.amplitudes.begin());
                         }
                         Aabb& box = placing.boxes[i];
                         if (body.modal && fields.has(placing.bodies[i]) && std::isfinite(s.doubt)) {
@@ -245,9 +247,8 @@ void ManifoldFinder::exclude_pair(Index a, Index b, bool excluded) { impl_->bodi
 void ManifoldFinder::save_state(StateWriter& state) const {
   state(static_cast<std::uint64_t>(impl_->graph.living()));
   impl_->graph.for_each([&](const BodyPair& pair, const LivePair& live) { state(pair.a, pair.b, live); });
-  for (std::size_t i = 0; i < impl_->bodies.size(); ++i)
-    if (const auto index = static_cast<Index>(i); impl_->at(index).modal)
-      state(impl_->bent(index)), state.numbers(impl_->at(index).amplitudes);
+  for (const internal::ManifoldBody& body : impl_->bodies.all())
+    if (body.modal) state(body.bent), state.numbers(body.amplitudes);
 }
 
 void ManifoldFinder::restore_state(StateReader& state) {
@@ -263,7 +264,7 @@ void ManifoldFinder::restore_state(StateReader& state) {
     if (!body.modal) continue;
     body.bent = state.read<double>();
     state.numbers(body.amplitudes);
-    if (impl_->fields.has(index)) impl_->fields.restore(index, body.amplitudes, body.bent);
+    if (impl_->fields.has(index)) impl_->fields.restore(index, body.amplitudes);
   }
   impl_->bodies.forget_places();
 }

@@ -131,7 +131,6 @@ struct ManifoldFinder::Impl {
   double reach(Index body, const Vec3& along) const;
   double farthest(const internal::PairQuery& query) const;
   double slack(const internal::PairQuery& query) const;
-  double bent(Index body) const { return fields.has(body) ? fields.bent(body) : at(body).bent; }
   void write_contacts(std::vector<ContactPoint>& contacts, Jobs& jobs);
   std::size_t write(const internal::LivePair& live, const BodyPair& pair, internal::ManifoldWorker& worker,
                     ContactPoint* to) const;

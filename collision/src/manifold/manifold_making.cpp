@@ -65,7 +65,7 @@ bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const
   const double farthest = this->farthest(q);
   if (!pair.known || (q.by_fields ? q.expected.near > pair.reach : q.reach > pair.reach + farthest)) return false;
   if (!q.by_fields && !hardly_moved(q, pair.X_LS, q.X_LS)) return false;
-  const double bent = this->bent(q.index_a) - pair.bent[0] + this->bent(q.index_b) - pair.bent[1];
+  const double bent = q.a.bent - pair.bent[0] + q.b.bent - pair.bent[1];
   return q.by_fields ? way(q, pair.X_LS, q.X_LS) + bent + comes(q) <= slack(q) : bent <= farthest;
 }
 
@@ -123,7 +123,7 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   pair.known = kept;
   pair.X_LS = q.X_LS;
   pair.reach = q.by_fields ? q.expected.near : q.reach;
-  pair.bent = {bent(q.index_a), bent(q.index_b)};
+  pair.bent = {q.a.bent, q.b.bent};
 }
 
 /// Adds the contacts of all places where two bodies come to touch on their way.
