@@ -310,11 +310,15 @@ void JointConstraint::bend(const Instant& at, const RowPlan& plan, const Directi
   }
   if (b.bend) b.bend_origin(along.linear, of_b);
   if (plan.measure == Measure::kTranslation) {
-    if (a.bend) a.bend_axis(plan.axis, plan.sign * (b.position - a.position), of_a), a.bend_origin(-along.linear, of_a);
+    if (!a.bend) return;
+    a.bend_axis(plan.axis, plan.sign * (b.position - a.position), of_a);
+    a.bend_origin(-along.linear, of_a);
     return;
   }
   if (b.bend) b.bend_turn(along.angular, of_b);
-  if (a.bend) a.bend_point(b.position, -along.linear, of_a), a.bend_turn(-along.angular, of_a);
+  if (!a.bend) return;
+  a.bend_point(b.position, -along.linear, of_a);
+  a.bend_turn(-along.angular, of_a);
 }
 
 void JointConstraint::add_rows(const BodyStates& states, StepTime when, double step, ConstraintRows& rows) {
