@@ -2,21 +2,16 @@
 // valid until the next call. Functions that can fail return 0 and leave one line in page_error().
 #include <cstddef>
 #include <cstdio>
-#include <exception>
 #include <memory>
 #include <span>
 #include <string>
 
 #include "limber/view/page_world.h"
-
-#ifdef __EMSCRIPTEN__
-#include <emscripten.h>
-#else
-#define EMSCRIPTEN_KEEPALIVE
-#endif
+#include "wasm_function.h"
 
 namespace {
 
+using limber::guarded;
 using limber::PageHit;
 using limber::PageSettings;
 using limber::PageWorld;
@@ -29,17 +24,6 @@ std::span<const double> ray, blows;
 double answer[16];
 std::span<const double> contacts;
 limber::PageSurface bent;
-
-template <class F>
-int guarded(F&& work) {
-  try {
-    work();
-    return 1;
-  } catch (const std::exception& e) {
-    error = e.what();
-    return 0;
-  }
-}
 
 /// From 12 numbers: gravity, drag_frequency, poke_speed, step, substeps, modes, damping, friction, solver,
 /// joint_friction.
@@ -64,13 +48,13 @@ extern "C" {
 
 EMSCRIPTEN_KEEPALIVE const char* page_error() { return error.c_str(); }
 EMSCRIPTEN_KEEPALIVE int page_open(const char* scene) {
-  return guarded([&] { page = std::make_unique<PageWorld>(scene, false); });
+  return guarded(error, [&] { page = std::make_unique<PageWorld>(scene, false); });
 }
 EMSCRIPTEN_KEEPALIVE int page_begin() {
-  return guarded([] { page->begin(); });
+  return guarded(error, [] { page->begin(); });
 }
 EMSCRIPTEN_KEEPALIVE const char* page_description() {
-  return guarded([] { text = page->description(); }) != 0 ? text.c_str() : "";
+  return guarded(error, [] { text = page->description(); }) != 0 ? text.c_str() : "";
 }
 
 // Data of model i: 0 rest, 1 normals (floats), 2 triangles (32 bits each); 3 to 5: of the surface that touches.
@@ -105,20 +89,20 @@ EMSCRIPTEN_KEEPALIVE const float* page_bent(int what) {
 }
 
 EMSCRIPTEN_KEEPALIVE int page_set_live(const double* settings) {
-  return guarded([&] { page->set_live(settings_of(settings)); });
+  return guarded(error, [&] { page->set_live(settings_of(settings)); });
 }
 EMSCRIPTEN_KEEPALIVE int page_restart(const double* settings) {
-  return guarded([&] {
+  return guarded(error, [&] {
     PageSettings next = settings_of(settings);
     next.stiffness = page->settings().stiffness;
     page->restart(next);
   });
 }
 EMSCRIPTEN_KEEPALIVE int page_set_stiffness(int model, double factor) {
-  return guarded([&] { page->set_stiffness(model, factor); });
+  return guarded(error, [&] { page->set_stiffness(model, factor); });
 }
 EMSCRIPTEN_KEEPALIVE int page_step() {
-  return guarded([] { page->step(); });
+  return guarded(error, [] { page->step(); });
 }
 EMSCRIPTEN_KEEPALIVE double page_steps_taken() { return static_cast<double>(page->steps_taken()); }
 EMSCRIPTEN_KEEPALIVE const char* page_hash() {
@@ -134,13 +118,13 @@ EMSCRIPTEN_KEEPALIVE const double* page_joint_frames() { return page->joint_fram
 // Per joint and coordinate (3) where it is led, and its speed; NaN: nowhere, none.
 EMSCRIPTEN_KEEPALIVE const double* page_joint_wishes() { return page->joint_wishes().data(); }
 EMSCRIPTEN_KEEPALIVE int page_lead_joint(int joint, int coordinate, double place) {
-  return guarded([&] { page->lead_joint(joint, coordinate, place); });
+  return guarded(error, [&] { page->lead_joint(joint, coordinate, place); });
 }
 EMSCRIPTEN_KEEPALIVE int page_run_joint(int joint, int coordinate, double speed) {
-  return guarded([&] { page->run_joint(joint, coordinate, speed); });
+  return guarded(error, [&] { page->run_joint(joint, coordinate, speed); });
 }
 EMSCRIPTEN_KEEPALIVE int page_leave_joint(int joint, int coordinate) {
-  return guarded([&] { page->leave_joint(joint, coordinate); });
+  return guarded(error, [&] { page->leave_joint(joint, coordinate); });
 }
 
 // What pressed in the last step, six numbers each (PageWorld::contacts()): how many, and where they are until the next.
@@ -183,23 +167,23 @@ EMSCRIPTEN_KEEPALIVE const double* page_hand() {
   return answer;
 }
 EMSCRIPTEN_KEEPALIVE int page_pin() {
-  return guarded([] { page->pin(hit); });
+  return guarded(error, [] { page->pin(hit); });
 }
 EMSCRIPTEN_KEEPALIVE void page_unpin() { page->unpin(); }
 EMSCRIPTEN_KEEPALIVE int page_poke(double dx, double dy, double dz, double contact_time) {
-  return guarded([&] { page->poke(hit, {dx, dy, dz}, contact_time); });
+  return guarded(error, [&] { page->poke(hit, {dx, dy, dz}, contact_time); });
 }
 EMSCRIPTEN_KEEPALIVE int page_drop(int model, double x, double y, double z) {
-  return guarded([&] { page->drop(model, {x, y, z}); });
+  return guarded(error, [&] { page->drop(model, {x, y, z}); });
 }
 EMSCRIPTEN_KEEPALIVE int page_show_mode(int body, int mode, double amplitude) {
-  return guarded([&] { page->show_mode(body, mode, amplitude); });
+  return guarded(error, [&] { page->show_mode(body, mode, amplitude); });
 }
 
 // Sound of model i: 0 eigenvalues, 1 decays, 2 gains (doubles), 3 shapes (floats); null where it has none.
 EMSCRIPTEN_KEEPALIVE const void* page_sound_data(int model, int what) {
   const void* data = nullptr;
-  guarded([&] {
+  guarded(error, [&] {
     const limber::SoundingBody& body = page->sounding(model);
     switch (what) {
       case 0:
@@ -229,36 +213,37 @@ EMSCRIPTEN_KEEPALIVE int page_blows() {
 EMSCRIPTEN_KEEPALIVE const double* page_blow_numbers() { return blows.data(); }
 
 EMSCRIPTEN_KEEPALIVE int page_keep() {
-  return guarded([] { page->keep(); });
+  return guarded(error, [] { page->keep(); });
 }
 EMSCRIPTEN_KEEPALIVE int page_kept() { return page->kept(); }
 EMSCRIPTEN_KEEPALIVE double page_kept_step(int key) { return static_cast<double>(page->kept_step(key)); }
 EMSCRIPTEN_KEEPALIVE int page_go_to(int key) {
-  return guarded([&] { page->go_to(key); });
+  return guarded(error, [&] { page->go_to(key); });
 }
 
 // All that is to be known to go on from here: how many bytes, 0 where it fails; page_text() has them.
 EMSCRIPTEN_KEEPALIVE double page_save() {
-  return guarded([] {
-           const std::vector<std::byte> saved = page->saved();
-           text.assign(reinterpret_cast<const char*>(saved.data()), saved.size());
-         }) != 0
+  return guarded(error,
+                 [] {
+                   const std::vector<std::byte> saved = page->saved();
+                   text.assign(reinterpret_cast<const char*>(saved.data()), saved.size());
+                 }) != 0
              ? static_cast<double>(text.size())
              : 0.0;
 }
 EMSCRIPTEN_KEEPALIVE int page_restore(const std::byte* saved, int size) {
-  return guarded([&] { page->restore({saved, static_cast<std::size_t>(size)}); });
+  return guarded(error, [&] { page->restore({saved, static_cast<std::size_t>(size)}); });
 }
 
 // A GLB of what was kept: how many bytes, 0 where it fails; page_text() has them until the next text.
 EMSCRIPTEN_KEEPALIVE double page_record() {
-  return guarded([] { text = page->recording(); }) != 0 ? static_cast<double>(text.size()) : 0.0;
+  return guarded(error, [] { text = page->recording(); }) != 0 ? static_cast<double>(text.size()) : 0.0;
 }
 EMSCRIPTEN_KEEPALIVE const char* page_text() { return text.data(); }
 
 // Surface by the engine itself, for comparison with what is drawn: 3 V floats of body `body` into `positions`.
 EMSCRIPTEN_KEEPALIVE int page_reconstruct(int body, float* positions) {
-  return guarded([&] { page->reconstruct(body, positions); });
+  return guarded(error, [&] { page->reconstruct(body, positions); });
 }
 
 }  // extern "C"
