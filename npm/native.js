@@ -8,16 +8,16 @@ let wasm, loading, structs, defaults;
 const bad = (line) => new LimberError(1, line);
 
 /** Loads the WebAssembly, once. @param source of limber.wasm: bytes, a Response, a URL, a WebAssembly.Module, or a promise of one */
-export function load(source = new URL('./limber.wasm', import.meta.url)) {
-  return loading ??= begin(source).catch((error) => { loading = undefined; throw error; });
-}
+export const load = (source = new URL('./limber.wasm', import.meta.url)) => loadOnce(instantiate, source, 'limber.wasm');
 export const isLoaded = () => wasm !== undefined;
 
-async function begin(source) {
-  wasm = await start(instantiate, await compile(source, 'limber.wasm'));
+/** @param make what emscripten wrote beside the file, which has the C interface, and may have more */
+export function loadOnce(make, source, file) {
+  const begin = async () => { wasm = await start(make, await compile(source, file)); };
+  return loading ??= begin().catch((error) => { loading = undefined; throw error; });
 }
 
-function loaded() {
+export function loaded() {
   if (wasm === undefined) throw bad('limber is not loaded yet: await load() first');
   return wasm;
 }
@@ -47,6 +47,9 @@ export class Native {
     this.destroy?.();
   }
 }
+/** @param destroy none: its owner does @param owner in whose memory it lies */
+export const wrapped = (Class, pointer, destroy, owner) => new Class(forgotten, pointer, destroy, owner);
+
 if (Symbol.dispose) Native.prototype[Symbol.dispose] = Native.prototype.dispose;
 
 /** Numbers in the library's memory: what it fills is there without a copy. */
@@ -143,7 +146,7 @@ function array_(type, items, name) {
   return address;
 }
 
-function text(address) {
+export function text(address) {
   const end = wasm.HEAPU8.indexOf(0, address);
   return new TextDecoder().decode(wasm.HEAPU8.slice(address, end));
 }
@@ -171,7 +174,7 @@ function read(type, address) {
 
 // Calls -----------------------------------------------------------------------------------------------------------
 
-function check(result) {
+export function check(result) {
   if (result) throw new LimberError(result, text(wasm._limber_last_error()));
 }
 

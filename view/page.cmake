@@ -27,6 +27,8 @@ file(CREATE_LINK ${LIMBER_JSON_INCLUDE}/nlohmann ${page_headers}/nlohmann SYMBOL
 
 # Debian's emscripten looks for Node packages where Node of elsewhere does not.
 set(page_engine ${CMAKE_CURRENT_BINARY_DIR}/engine)
+set(page_package limber.js native.js posing.js posing.wasm posing_wasm.js scene.js scene.wasm scene_wasm.js source.js)
+list(TRANSFORM page_package PREPEND ${page_engine}/npm/package/)
 set(with_node_path ${CMAKE_COMMAND} -E env NODE_PATH=/usr/share/nodejs)
 ExternalProject_Add(limber_page_engine
   SOURCE_DIR ${CMAKE_CURRENT_SOURCE_DIR}/engine
@@ -35,9 +37,8 @@ ExternalProject_Add(limber_page_engine
     -DCMAKE_TOOLCHAIN_FILE=${emscripten_root}/cmake/Modules/Platform/Emscripten.cmake -DCMAKE_BUILD_TYPE=Release
     "-DCMAKE_CXX_FLAGS_RELEASE=-O3 -DNDEBUG" -DEigen3_DIR=${Eigen3_DIR} -DLIMBER_PAGE_HEADERS=${page_headers}
     -DLIMBER_WARNINGS_AS_ERRORS=OFF
-  BUILD_COMMAND ${with_node_path} ${CMAKE_COMMAND} --build <BINARY_DIR> --target page_engine page_sound limber_npm
-  BUILD_BYPRODUCTS ${page_engine}/page_engine.mjs ${page_engine}/page_engine.wasm ${page_engine}/page_sound.wasm
-    ${page_engine}/npm/package/posing.js ${page_engine}/npm/package/posing.wasm
+  BUILD_COMMAND ${with_node_path} ${CMAKE_COMMAND} --build <BINARY_DIR> --target page_sound limber_npm
+  BUILD_BYPRODUCTS ${page_engine}/page_sound.wasm ${page_package}
   INSTALL_COMMAND ""
   BUILD_ALWAYS ON
   USES_TERMINAL_BUILD ON)
@@ -61,8 +62,7 @@ add_custom_command(OUTPUT ${page_web}/node_modules/.installed
 add_custom_command(OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/empty_page.cpp
   COMMAND ${LIMBER_NODE} build.mjs ${page_engine} ${CMAKE_CURRENT_BINARY_DIR}/empty_page.cpp
   WORKING_DIRECTORY ${page_web}
-  DEPENDS ${page_copies} ${page_web}/node_modules/.installed ${page_engine}/page_engine.mjs ${page_engine}/page_engine.wasm
-          ${page_engine}/page_sound.wasm ${page_engine}/npm/package/posing.js ${page_engine}/npm/package/posing.wasm
+  DEPENDS ${page_copies} ${page_web}/node_modules/.installed ${page_engine}/page_sound.wasm ${page_package}
   COMMENT "The page without a scene")
 add_library(limber_page STATIC ${CMAKE_CURRENT_BINARY_DIR}/empty_page.cpp)
 add_dependencies(limber_page limber_page_engine)

@@ -1,5 +1,6 @@
 // What a user writes in TypeScript, and what the types refuse. tsc checks it with the package's own declarations.
 import { Asset, load, Memory, Shape, World } from 'limber';
+import { Scene, load as loadScenes } from 'limber/scene';
 import { Posing, load as loadPosing, type PoseResult } from 'limber/posing';
 
 await load();
@@ -30,3 +31,12 @@ const found: PoseResult = posing.solve();
 if (found.status === 'converged') console.log(posing.modelText(), posing.scene.parts[0]?.name);
 // @ts-expect-error handles are numbers
 posing.take('first');
+
+await loadScenes();
+const scene = Scene.open({ 's.json': '{}' }, 's.json'), played: World = scene.begin({ modes: 3, stiffness: [null, 0.5] });
+scene.step();
+played.applyImpulse(scene.addBody(0, [0, 0, 1], 'more'), { triangle: 0 }, [0, 0, 1], 0, 0);
+const drawn: Float32Array | undefined = scene.bent(0, 1e-4)?.positions;
+console.log(drawn?.length, scene.sums().asleep, scene.joints[0]?.index);
+// @ts-expect-error settings have names
+scene.begin({ speed: 3 });

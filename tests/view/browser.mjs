@@ -5,6 +5,7 @@ import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { gunzipSync } from 'node:zlib';
 import { chromium } from 'playwright-core';
 
 export const folder = mkdtempSync(join(tmpdir(), 'limber-page-'));
@@ -65,7 +66,7 @@ export async function isSafe(page, path) {
   await wait(100);
   probing = false;
   check(refused, 'text is not run as a script');
-  const text = readFileSync(path, 'utf8'), script = text.slice(text.lastIndexOf('<script>'), text.lastIndexOf('</script>'));
+  const text = readFileSync(path, 'utf8'), script = gunzipSync(Buffer.from(/id="app">([^<]*)</.exec(text)[1], 'base64')).toString();
   check(script.length > 1000 && !/\beval\(|new Function\(/.test(script), 'the script runs no text');
   const licences = await page.evaluate(() => document.getElementById('licences').textContent);
   for (const name of ['limber', 'three.js', 'Eigen', 'Highway', 'JSON for Modern C++', 'Emscripten', 'Permission is hereby granted'])

@@ -1,9 +1,12 @@
 #include "description.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "joint_loads.h"
 #include "limber/collision/shape_surface.h"
+#include "limber/scene/scene_player.h"
 
 namespace limber::internal {
 namespace {
@@ -38,7 +41,7 @@ Json limits(const JointSpec& spec) {
 }
 
 /// None: rigid.
-Json factor_json(const PageSettings& settings, std::size_t model) {
+Json factor_json(const LiveSettings& settings, std::size_t model) {
   const double factor = model < settings.stiffness.size() ? settings.stiffness[model] : 1.0;
   return std::isinf(factor) ? Json() : Json(factor);
 }
@@ -65,31 +68,75 @@ Json standing_shape(const Standing& standing, const Shape& shape) {
   return json;
 }
 
+/// Numbers of bodies by name; −1: the world.
+Index number_of(const std::string& name, const Scene& scene) {
+  const auto body =
+      std::find_if(scene.bodies.begin(), scene.bodies.end(), [&](const SceneBody& b) { return b.name == name; });
+  return body == scene.bodies.end() ? Linkage::kWorld : static_cast<Index>(body - scene.bodies.begin());
+}
+
+/// As the bodies are placed.
+Linkage linkage_of(const Scene& scene, std::span<const std::shared_ptr<const ModalModel>> kinds,
+                   std::span<const LiveScene::Body> bodies) {
+  Linkage linkage;
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const ModalModelData& data = kinds[bodies[i].model]->data();
+    const Vec3 centre = start_of(scene.bodies[i]).pose * data.center_of_mass;
+    linkage.bodies.push_back({centre, data.mass, 0.5 * data.inertia.trace()});
+  }
+  for (const SceneJoint& joint : scene.joints)
+    linkage.joints.push_back({number_of(joint.a, scene), number_of(joint.b, scene), joint.spec.frame.origin});
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+    if (kinds[bodies[i].model]->data().motion != FrameMotion::kFree)
+      linkage.joints.push_back({Linkage::kWorld, static_cast<Index>(i), linkage.bodies[i].centre});
+  return linkage;
+}
+
+/// Where it is drawn: in the frame of a body, which the world moves as.
+Json joint_json(const Scene& scene, std::size_t number, const JointLoad& load) {
+  const SceneJoint& joint = scene.joints[number];
+  const Index on = number_of(joint.a.empty() ? joint.b : joint.a, scene);
+  const RigidTransform X = start_of(scene.bodies[static_cast<std::size_t>(on)]).pose.inverse();
+  Json json = {{"type", to_string(joint.spec.type)},
+               {"a", joint.a},
+               {"b", joint.b},
+               {"limits", limits(joint.spec)},
+               {"on", on},
+               {"origin", vector(X * joint.spec.frame.origin)},
+               {"axis", vector(X.q * Vec3(joint.spec.frame.axes.col(0)))},
+               {"load", {{"mass", load.mass}, {"moment", load.moment}, {"inertia", load.inertia}}}};
+  json["acts"] = Json::array();
+  for (const JointActuation& acts : joint.coordinates)
+    json["acts"].push_back({{"motorVelocity", acts.motor_velocity},
+                            {"motorMaxForce", acts.motor_max_force},
+                            {"driveTarget", acts.drive_target},
+                            {"driveStiffness", acts.drive_stiffness},
+                            {"driveDamping", acts.drive_damping},
+                            {"friction", acts.friction}});
+  return json;
+}
+
 }  // namespace
 
-std::string describe(const Scene& scene, const SceneModels& models, std::span<const PageModel> shown,
-                     std::span<const PageBody> bodies, const PageSettings& settings) {
+std::string describe(const Scene& scene, const SceneModels& models,
+                     std::span<const std::shared_ptr<const ModalModel>> kinds, const LiveSound& sound,
+                     std::span<const LiveScene::Body> bodies, const LiveSettings& settings) {
   Json out;
   out["name"] = scene.name;
-  out["settings"] = {{"gravity", vector(settings.gravity)},  {"drag_frequency", settings.drag_frequency},
-                     {"poke_speed", settings.poke_speed},    {"step", settings.step},
+  out["settings"] = {{"gravity", vector(settings.gravity)},  {"step", settings.step},
                      {"substeps", settings.substeps},        {"modes", settings.modes},
                      {"damping", settings.damping},          {"friction", settings.friction},
                      {"solver", to_string(settings.solver)}, {"joint_friction", settings.joint_friction}};
   out["settings"]["stiffness"] = Json::array();
-  for (std::size_t i = 0; i < shown.size(); ++i) out["settings"]["stiffness"].push_back(factor_json(settings, i));
+  for (std::size_t i = 0; i < kinds.size(); ++i) out["settings"]["stiffness"].push_back(factor_json(settings, i));
   out["contact"] = scene.contacts.options.has_value();
   out["models"] = Json::array();
-  for (const PageModel& model : shown)
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    const SoundModes* heard = sound.modes(i);
     out["models"].push_back(
-        {{"name", model.name},
-         {"mass", model.mass},
-         {"sound",
-          {{"modes", model.sound ? model.sound->modes() : 0}, {"vertices", model.sound ? model.sound->vertices : 0}}},
-         {"vertices", model.rest.size() / 3},
-         {"triangles", model.triangles.size() / 3},
-         {"frequencies", model.frequencies},
-         {"visible_amplitudes", model.visible_amplitudes}});
+        {{"name", kinds[i]->name()},
+         {"sound", {{"modes", heard ? heard->modes() : 0}, {"vertices", heard ? heard->vertices : 0}}}});
+  }
   out["bodies"] = Json::array();
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     out["bodies"].push_back({{"name", bodies[i].name}, {"model", bodies[i].model}});
@@ -103,9 +150,8 @@ std::string describe(const Scene& scene, const SceneModels& models, std::span<co
   for (std::size_t i = 0; i < scene.sensors.size(); ++i)
     out["sensors"].push_back(standing_shape(scene.sensors[i], *models.shape_of_sensor[i]));
   out["joints"] = Json::array();
-  for (const SceneJoint& joint : scene.joints)
-    out["joints"].push_back(
-        {{"type", to_string(joint.spec.type)}, {"a", joint.a}, {"b", joint.b}, {"limits", limits(joint.spec)}});
+  const std::vector<JointLoad> loads = joint_loads(linkage_of(scene, kinds, bodies));
+  for (std::size_t i = 0; i < scene.joints.size(); ++i) out["joints"].push_back(joint_json(scene, i, loads[i]));
   return out.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 

@@ -1,5 +1,5 @@
 // node build.mjs ENGINE_FOLDER OUT.cpp: the page without a scene, all in one file, as a C++ constant. ENGINE_FOLDER has
-// page_engine.mjs, page_engine.wasm, page_sound.wasm and npm/package; limber-view puts the files of a scene in the place of "@FILES@".
+// page_sound.wasm and npm/package; limber-view puts the files of a scene in the place of "@FILES@".
 import { createHash } from 'node:crypto';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
@@ -18,17 +18,18 @@ const bundle = await esbuild.build({
   bundle: true,
   format: 'iife',
   platform: 'browser',
-  alias: { 'page-engine': join(engine, 'page_engine.mjs'), 'limber/posing': join(engine, 'npm', 'package', 'posing.js') },
-  logOverride: { 'empty-import-meta': 'silent' },  // where posing.wasm is, which the page has inside
+  alias: Object.fromEntries(['limber', 'limber/posing', 'limber/scene'].map((name) => [name, join(engine, 'npm', 'package', `${name.split('/').at(-1)}.js`)])),
+  logOverride: { 'empty-import-meta': 'silent' },  // where the WebAssembly is, which the page has inside
   external: ['module', 'fs', 'path', 'url', 'crypto', 'worker_threads', 'ws'],  // what the engine asks Node for
 });
-const script = inElement(bundle), style = read(here, 'style.css');
-const zipped = (name) => gzipSync(readFileSync(join(engine, name)), { level: 9 }).toString('base64');
+const base64 = (bytes) => gzipSync(bytes, { level: 9 }).toString('base64'), zipped = (name) => base64(readFileSync(join(engine, name)));
+const script = read(here, 'begin.js').trim(), style = read(here, 'style.css');
 const hash = (text) => `'sha256-${createHash('sha256').update(text, 'utf8').digest('base64')}'`;
 const parts = {
   CSP: `default-src 'none'; script-src ${hash(script)} 'strict-dynamic' 'wasm-unsafe-eval'; style-src ${hash(style)}; img-src data:; base-uri 'none'; form-action 'none'`,
   STYLE: style,
   SCRIPT: script,
+  APP: base64(bundle.outputFiles[0].contents),
   LICENCES: ['In this page: limber (MIT licence), three.js, Eigen (MPL-2.0), Highway (Apache-2.0), JSON for Modern C++ (MIT), and the C and C++ libraries of Emscripten (MIT, Apache-2.0 with LLVM exception).',
     `three.js:\n${read(here, 'node_modules', 'three', 'LICENSE')}`].join('\n\n'),
   // A module of the thread that plays has an address. 'strict-dynamic' lets the script that has the hash load one of data:, and markup
@@ -53,7 +54,7 @@ writeFileSync(out, `// Made by build.mjs.
 namespace limber {
 namespace {
 
-${constant('kBefore', before)}${constant('kAfter', after)}${constant('kEngine', zipped('page_engine.wasm'))}${constant('kPosing', zipped(join('npm', 'package', 'posing.wasm')))}
+${constant('kBefore', before)}${constant('kAfter', after)}${constant('kEngine', zipped(join('npm', 'package', 'scene.wasm')))}${constant('kPosing', zipped(join('npm', 'package', 'posing.wasm')))}
 }  // namespace
 
 std::string empty_page(bool poses) { return std::string(kBefore) + (poses ? kPosing : kEngine) + kAfter; }

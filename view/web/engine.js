@@ -1,180 +1,249 @@
-// The engine: WebAssembly behind plain functions, with texts and arrays copied out where they are to last.
-import makePageEngine from 'page-engine';
-import { fileOf } from './unpack.js';
+// The scene of a page, as a person has it: limber/scene, hands that reach into its World, and a history.
+import { Snapshot } from 'limber';
+import { load, Scene } from 'limber/scene';
+import { array, Hands, rayHits } from './hands.js';
+import { History } from './history.js';
+import { base64Of, bytesOf, fileOf } from './unpack.js';
 
-/** @param wasm bytes. @param files of the page (unpack.js), their paths below /scene/ */
-export async function openModule(wasm, files) {
-  const module = await makePageEngine({ wasmBinary: wasm, print() {}, printErr() {} });
-  for (const file of files) {
-    module.FS.mkdirTree(file.path.slice(0, file.path.lastIndexOf('/')));
-    module.FS.writeFile(file.path, await fileOf(file));
-  }
-  return module;
+const VISIBLE = 0.1;  // of a model's size, for a mode that is shown
+
+/** @param wasm bytes. @param files of the page (unpack.js) */
+export async function openScene(wasm, files, scene) {
+  const path = (from) => from.replace(/^\//, '');
+  await load(wasm);
+  return new Engine(Scene.open(Object.fromEntries(await Promise.all(files.map(async (file) => [path(file.path), await fileOf(file)]))), path(scene)));
 }
 
 export class Engine {
-  /** @throws Error with the engine's own line */
-  constructor(module, scene) {
-    this.module = module;
-    const length = module.lengthBytesUTF8(scene) + 1, at = module._malloc(length);
-    module.stringToUTF8(scene, at, length);
-    const opened = module._page_open(at);
-    module._free(at);
-    this.check(opened);
-    this.settingsAt = module._malloc(12 * 8);
+  /** @param played limber/scene's Scene, before it begins */
+  constructor(played) {
+    this.played = played;
+    this.history = new History();
+    this.live = { drag_frequency: 3, poke_speed: 1 };
+    this.hit = null;  // of the last cast
     this.describe();
-  }
-
-  /** Makes the world: until then bodies may be looked at as they are placed. */
-  begin() { this.check(this.module._page_begin()); }
-
-  check(done) {
-    if (!done) throw new Error(this.module.UTF8ToString(this.module._page_error()));
   }
 
   describe() {
-    this.scene = JSON.parse(this.module.UTF8ToString(this.module._page_description()));
-    this.sizes = this.scene.bodies.map((body) => 7 + this.scene.models[body.model].frequencies.length);
-    this.frameSize = this.sizes.reduce((sum, size) => sum + size, 0);
+    const { description, models } = this.played;
+    this.surfaces = models.map((model) => model.getData());
+    this.scene = { ...description, settings: { ...description.settings, ...this.live }, bodies: description.bodies.slice(),
+      models: description.models.map((told, i) => ({ ...told, mass: this.surfaces[i].mass, frequencies: [...this.surfaces[i].eigenvalue].map((x) => Math.sqrt(x) / (2 * Math.PI)) })) };
+    this.visible = {};
+    this.added = [];  // models of bodies that were dropped, in this history
+    this.measure();
   }
+  measure() {
+    this.sizes = this.scene.bodies.map(({ model }) => 7 + this.scene.models[model].frequencies.length);
+  }
+  get world() { return this.played.world; }
 
-  floats(at, count) { return this.module.HEAPF32.slice(at / 4, at / 4 + count); }
-  doubles(at, count) { return this.module.HEAPF64.slice(at / 8, at / 8 + count); }
-
-  model(i) {
-    const { vertices, triangles } = this.scene.models[i];
-    return this.surface(i, 0, vertices, triangles);
-  }
-  /** The surface by which bodies of a model touch; null: the drawn one. */
-  touching(i) {
-    const [vertices, triangles] = this.doubles(this.module._page_touching_size(i), 2);
-    return vertices === 0 ? null : this.surface(i, 3, vertices, triangles);
-  }
-  surface(i, first, vertices, triangles) {
-    const data = (what) => this.module._page_model_data(i, first + what), corners = data(2) / 4;
-    return {
-      rest: this.floats(data(0), 3 * vertices),
-      normals: this.floats(data(1), 3 * vertices),
-      triangles: this.module.HEAPU32.slice(corners, corners + 3 * triangles),
-    };
-  }
-  /**
-   * A body's surface in its own frame, off by no more than the tolerance, m. @param touching that by which it touches
-   * @return {positions, normals} until the next call of the engine; null: it is at rest
-   */
-  bent(body, tolerance, touching, vertices) {
-    if (this.module._page_bend(body, tolerance, touching ? 1 : 0) === 0) return null;
-    const floats = (what) => new Float32Array(this.module.HEAPF32.buffer, this.module._page_bent(what), 3 * vertices);
-    return { positions: floats(0), normals: floats(1) };
-  }
-
-  writeSettings(s) {
-    const solvers = ['game', 'exact'];
-    this.module.HEAPF64.set([...s.gravity, s.drag_frequency, s.poke_speed, s.step, s.substeps, s.modes, s.damping, s.friction,
-      solvers.indexOf(s.solver), s.joint_friction], this.settingsAt / 8);
-  }
-  setLive(s) { this.writeSettings(s); this.check(this.module._page_set_live(this.settingsAt)); }
-  restart(s) { this.writeSettings(s); this.check(this.module._page_restart(this.settingsAt)); this.describe(); }
-
-  /** @param factor on Young's modulus; Infinity: rigid */
-  setStiffness(model, factor) { this.check(this.module._page_set_stiffness(model, factor)); this.describe(); }
-
-  step() { this.check(this.module._page_step()); this.check(this.module._page_keep()); }
-  steps() { return this.module._page_steps_taken(); }
-  hash() { return this.module.UTF8ToString(this.module._page_hash()); }
-  frame() { return this.floats(this.module._page_frame(), this.frameSize); }
-  numbers() {
-    const [time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, solved] =
-      this.doubles(this.module._page_numbers(), 10);
-    return { time, rigid, modal, elastic, potential, asleep, contacts, rows, iterations, solved };
-  }
-  /** Seconds of the last step, as limber/core/stage_times.h has its stages, those of a step. */
-  stages() { return [...this.doubles(this.module._page_stage_seconds(), 8)]; }
-  jointFrames() { return this.doubles(this.module._page_joint_frames(), 9 * this.scene.joints.length); }
-  /** @return by joint and coordinate {place, speed} where it is led and how fast it runs; NaN: neither */
-  jointWishes() {
-    const all = this.doubles(this.module._page_joint_wishes(), 6 * this.scene.joints.length);
-    return this.scene.joints.map((_, j) => [0, 1, 2].map((c) => ({ place: all[6 * j + 2 * c], speed: all[6 * j + 2 * c + 1] })));
-  }
-  leadJoint(joint, coordinate, place) { this.check(this.module._page_lead_joint(joint, coordinate, place)); }
-  runJoint(joint, coordinate, speed) { this.check(this.module._page_run_joint(joint, coordinate, speed)); }
-  leaveJoint(joint, coordinate) { this.check(this.module._page_leave_joint(joint, coordinate)); }
-  /** @return six numbers each, of what pressed in the last step: place and force */
-  contacts() {
-    const count = this.module._page_contact_count();
-    return this.doubles(this.module._page_contacts(), 6 * count);
-  }
-  /** How many bodies are in each sensor. */
-  sensorCounts() { return this.doubles(this.module._page_sensor_counts(), this.scene.sensors.length); }
-
-  /** @return [{body, point, normal}] of all that a ray meets, by distance; body −1: one that does not move */
-  rayPlaces(from, along) {
-    const count = this.module._page_ray(...from, ...along), all = this.doubles(this.module._page_ray_places(), 7 * count);
-    return Array.from({ length: count }, (_, i) => all.slice(7 * i, 7 * i + 7))
-      .map(([body, x, y, z, nx, ny, nz]) => ({ body, point: [x, y, z], normal: [nx, ny, nz] }));
-  }
-
-  cast(from, along) {
-    const [body, x, y, z, distance] = this.doubles(this.module._page_cast(...from, ...along), 5);
-    return body < 0 ? null : { body, point: [x, y, z], distance };
-  }
-  grab() { return this.module._page_grab() === 1; }
-  dragTo(target) { this.module._page_drag_to(...target); }
-  letGo() { this.module._page_let_go(); }
-  hand() {
-    const a = this.doubles(this.module._page_hand(), 11);
-    return { holds: a[0] === 1, point: a.slice(1, 4), target: a.slice(4, 7), force: a.slice(7, 10), pins: a[10] };
-  }
-  pin() { this.check(this.module._page_pin()); }
-  unpin() { this.module._page_unpin(); }
-  /** @param contactTime seconds, for the ear alone */
-  poke(along, contactTime) { this.check(this.module._page_poke(...along, contactTime)); }
-  drop(model, at) { this.check(this.module._page_drop(model, ...at)); this.describe(); }
-  showMode(body, mode, amplitude) { this.check(this.module._page_show_mode(body, mode, amplitude)); }
-
-  /** What one hears of a model: null, or its modes at the vertices of the surface that is struck. */
-  sound(model) {
-    const { modes, vertices } = this.scene.models[model].sound, data = (what) => this.module._page_sound_data(model, what);
-    if (modes === 0) return null;
-    const [eigenvalues, decays, gains] = [0, 1, 2].map((what) => this.doubles(data(what), modes));
-    return { modes, vertices, eigenvalues, decays, gains, shapes: this.floats(data(3), 3 * modes * vertices) };
-  }
-  /** Pascals at one metre that no poke at 1 m/s exceeds. */
-  loudness(model, contactTime) { return this.module._page_loudness(model, contactTime); }
-  listen(on) { this.module._page_listen(on ? 1 : 0); }
-  /** Blows since the last call, 15 numbers each: PageWorld::take_blows() */
-  takeBlows() {
-    const count = this.module._page_blows();
-    return this.doubles(this.module._page_blow_numbers(), count);
-  }
-
-  kept() { return this.module._page_kept(); }
-  keptStep(key) { return this.module._page_kept_step(key); }
-  goTo(key) { this.check(this.module._page_go_to(key)); this.describe(); }
-
-  /** @return the bytes of an animated GLB */
-  recording() { return this.bytes(this.module._page_record()); }
-  /** @return bytes from which a page goes on that has the same scene */
-  saved() { return this.bytes(this.module._page_save()); }
-  restore(bytes) {
-    const at = this.module._malloc(bytes.length);
-    this.module.HEAPU8.set(bytes, at);
-    const restored = this.module._page_restore(at, bytes.length);
-    this.module._free(at);
-    this.check(restored);
+  /** Makes the world anew: before the first time bodies may be looked at as they are placed. */
+  begin(settings = {}) {
+    this.hit = null;
+    const { gravity, step, substeps, modes, damping, friction, solver, joint_friction, stiffness } = { ...this.scene.settings, ...settings };
+    this.played.begin({ gravity, step, substeps, modes, damping, friction, solver, joint_friction, stiffness });
+    this.history.clear();
+    this.world.setStageTimes(true);
+    this.hands = new Hands(this.played);
     this.describe();
   }
-  bytes(size) {
-    this.check(size > 0);
-    const at = this.module._page_text();
-    return this.module.HEAPU8.slice(at, at + size);
+  restart(settings) {
+    const { drag_frequency, poke_speed } = settings;
+    Object.assign(this.live, { drag_frequency, poke_speed });
+    this.begin({ ...settings, stiffness: this.scene.settings.stiffness });
+    this.keep();
+  }
+  keep() { this.history.keep(this.played, this.hands.held, this.dropped); }
+  /** How many bodies. */
+  get dropped() { return this.scene.bodies.length - this.played.description.bodies.length; }
+
+  /** Gravity and hands at once. */
+  setLive({ gravity, drag_frequency, poke_speed }) {
+    if (gravity.some((x, i) => x !== this.scene.settings.gravity[i])) this.world.setGravity(gravity);
+    Object.assign(this.live, { drag_frequency, poke_speed });
+    Object.assign(this.scene.settings, { gravity, drag_frequency, poke_speed });
+  }
+
+  /** The clock begins at 0; bodies keep places and speeds, and their bending unless the model becomes rigid or was. @param factor on Young's modulus; Infinity: rigid */
+  setStiffness(model, factor) {
+    const stiffness = this.scene.settings.stiffness.map((x, i) => (i === model ? factor : x));
+    const before = this.played.bodies.map((id) => {
+      const { pose, velocity, angularVelocity, amplitude, rate } = this.world.bodyState(id);
+      return { pose, velocity, angularVelocity, amplitude: amplitude.slice(), rate: rate.slice() };
+    });
+    const added = this.added.slice(0, this.dropped), { joints } = this.hands.held;
+    this.begin({ stiffness });
+    this.addAll(added);
+    before.forEach(({ pose, velocity, angularVelocity, amplitude, rate }, i) => {
+      const id = this.played.bodies[i];
+      this.world.setPose(id, pose);
+      this.world.setVelocity(id, velocity, angularVelocity);
+      if (amplitude.length === this.sizes[i] - 7) this.world.setAmplitudes(id, amplitude, rate);
+    });
+    joints.forEach((wishes, j) => wishes.forEach((wish, c) => {
+      if (!Number.isNaN(wish.place) || !Number.isNaN(wish.speed)) this.wishJoint(j, c, wish);
+    }));
+    this.keep();
+  }
+
+  model(i) { return surface(this.surfaces[i].render); }
+  /** The surface by which bodies of a model touch; null: the drawn one. */
+  touching(i) {
+    const { render, collision } = this.played.models[i].getData();
+    return collision.rest.byteOffset === render.rest.byteOffset ? null : surface(collision);
+  }
+  bent(body, tolerance, touching) { return this.world === undefined ? null : this.played.bent(body, tolerance, touching); }
+
+  step() {
+    this.world.setStageTimes(true);  // from 0
+    this.played.step();
+    this.keep();
+  }
+  steps() { return this.played.stepsTaken(); }
+  hash() { return this.world.stateHash().toString(16).padStart(16, '0'); }
+  frame() { return this.played.frame(); }
+  numbers() {
+    const { kineticRigid: rigid, kineticModal: modal, elastic, potential, asleep, pressing: contacts } = this.played.sums();
+    return { time: this.world.time(), rigid, modal, elastic, potential, asleep, contacts, solved: this.world.constraintReport().solved };
+  }
+  /** Seconds of the last step, as limber/core/stage_times.h has its stages, those of a step. */
+  stages() { return this.world.getStageTimes().seconds.slice(0, 8); }
+  contacts() { return this.played.contacts(); }
+  sensorCounts() { return this.played.sensors.map((id) => this.world.listInside(id).length); }
+
+  jointFrames() { return this.hands.jointFrames(); }
+  jointWishes() { return this.hands.held.joints; }
+  wishJoint(joint, coordinate, wish) { this.hands.wish(joint, coordinate, isAngle(this.scene.joints[joint].type, coordinate), wish); }
+  leadJoint(joint, coordinate, place) { this.wishJoint(joint, coordinate, { place }); }
+  runJoint(joint, coordinate, speed) { this.wishJoint(joint, coordinate, { speed }); }
+  leaveJoint(joint, coordinate) { this.wishJoint(joint, coordinate); }
+
+  /** The number of a body of the scene; −1: one that does not move. */
+  number({ index, generation }) { return this.played.bodies.findIndex((id) => id.index === index && id.generation === generation); }
+  /** @return [{body, point, normal}] of all that a ray meets, by distance; body −1: one that does not move */
+  rayPlaces(from, along) {
+    return rayHits(this.world, from, along).map(({ body, position, normal }) => ({ body: this.number(body), point: array(position), normal: array(normal) }));
+  }
+  /** The first body that moves in a ray's way. It stays until the next cast. */
+  cast(from, along) {
+    this.hit = rayHits(this.world, from, along).find(({ body, hasPoint }) => hasPoint && this.number(body) >= 0) ?? null;
+    return this.hit && { body: this.number(this.hit.body), point: array(this.hit.position), distance: this.hit.distance };
+  }
+  /** @return whether there was something to take */
+  grab() {
+    if (this.hit !== null) this.hands.grab(this.hit, this.live.drag_frequency);
+    return this.hit !== null;
+  }
+  dragTo(target) { this.hands.dragTo(target); }
+  letGo() { this.hands.letGo(); }
+  hand() { return this.hands.state(); }
+  pin() { if (this.hit !== null) this.hands.pin(this.hit); }
+  unpin() { this.hands.unpin(); }
+  /** @param contactTime seconds, for the ear alone */
+  poke(along, contactTime) {
+    if (this.hit === null) return;
+    const impulse = this.hands.poke(this.hit, along, this.live.poke_speed);
+    this.played.noteBlow(this.number(this.hit.body), array(this.hit.position), impulse, contactTime);
+  }
+
+  drop(model, at) {
+    this.addAll([...this.added.slice(0, this.dropped), model], at);  // others are of a future that will not be
+  }
+  addAll(models, at) {
+    this.added = models;
+    this.addUntil(models.length, at);
+  }
+  /** Ids are given in the same order again. */
+  addUntil(count, at = [0, 0, 0]) {
+    for (let i = this.dropped; i < count; ++i) {
+      const name = `dropped[${i}]`;
+      this.played.addBody(this.added[i], at, name);
+      this.scene.bodies.push({ name, model: this.added[i] });
+    }
+    this.measure();
+  }
+
+  /** All others of the body are at rest. */
+  showMode(body, mode, share) {
+    const rest = new Float64Array(this.sizes[body] - 7), amplitudes = rest.slice();
+    amplitudes[mode] = share * (this.visible[`${body} ${mode}`] ??= this.visibleAmplitude(this.scene.bodies[body].model, mode));
+    this.world.setAmplitudes(this.played.bodies[body], amplitudes, rest);
+  }
+  /** The amplitude at which a mode moves some vertex by a tenth of the model's size. */
+  visibleAmplitude(number, mode) {
+    const model = this.played.models[number], { render, modeScale } = model.getData(), rest = render.rest.slice(), target = new Float32Array(rest.length);
+    const scale = modeScale[mode];
+    model.morphTarget(mode, target);
+    const longest = (of) => of.reduce((most, _, i) => (i % 3 === 0 ? Math.max(most, Math.hypot(of[i], of[i + 1], of[i + 2])) : most), 0);
+    const moved = longest(target);
+    return moved > 0 ? (VISIBLE * longest(rest) * scale) / moved : 0;
+  }
+
+  sound(model) { return this.played.sound(model); }
+  loudness(model, contactTime) { return this.played.loudness(model, contactTime); }
+  listen(on) { this.played.listen(on); }
+  takeBlows() { return this.played.takeBlows(); }
+
+  kept() { return this.history.keys.length; }
+  keptStep(key) { return this.history.keys[key].step; }
+  /** Back, or forth again, to the bit: a hand that held something then holds it again. */
+  goTo(key) {
+    const { snapshot, hands, added } = this.history.keys[key];
+    this.return(() => snapshot.bytes(), hands, added);
+  }
+  /** @param bytes gives them, in memory that has grown meanwhile */
+  return(bytes, hands, added) {
+    this.addUntil(added);
+    this.played.restoreState(bytes());
+    this.scene.bodies.length = this.played.bodies.length;
+    this.measure();
+    this.hands = new Hands(this.played, structuredClone(hands));
+    this.scene.settings.gravity = array(this.world.getOptions().gravity);
+  }
+
+  /** @return the bytes of an animated GLB of what was kept */
+  recording() {
+    const here = Snapshot.create(), hands = this.hands.held, added = this.dropped;
+    this.played.saveState(here);
+    try {
+      for (let key = 0; key < this.kept(); ++key) {
+        this.goTo(key);
+        this.played.record();
+      }
+      return this.played.recording();
+    } finally {
+      this.return(() => here.bytes(), hands, added);
+      here.dispose();
+    }
+  }
+
+  /** @return what JSON tells, from which a page goes on that has the same scene */
+  saved() {
+    const here = Snapshot.create();
+    this.played.saveState(here);
+    const state = base64Of(here.bytes());
+    here.dispose();
+    return { settings: this.scene.settings, added: this.added.slice(0, this.dropped), hands: this.hands.held, state };
+  }
+  /** Goes on from there; what was kept before is forgotten. */
+  restore({ settings, added, hands, state }) {
+    const { drag_frequency, poke_speed } = settings, number = (x) => x ?? NaN;
+    Object.assign(this.live, { drag_frequency, poke_speed });
+    this.begin(settings);
+    this.keep();
+    this.addAll(added);
+    this.return(() => bytesOf(state), { ...hands, joints: hands.joints.map((all) => all.map(({ place, speed }) => ({ place: number(place), speed: number(speed) }))) }, added.length);
+    this.keep();
   }
 
   reconstruct(body) {
-    const count = 3 * this.scene.models[this.scene.bodies[body].model].vertices, at = this.module._malloc(4 * count);
-    this.check(this.module._page_reconstruct(body, at));
-    const positions = this.floats(at, count);
-    this.module._free(at);
+    const positions = new Float32Array(3 * this.played.models[this.scene.bodies[body].model].getData().render.vertices);
+    this.world.reconstruct(this.played.bodies[body], positions, null, 1);
     return positions;
   }
 }
+
+const surface = ({ rest, corner }) => ({ rest: rest.slice(), triangles: Uint32Array.from(corner) });
+
+const isAngle = (type, coordinate) => type === 'ball' || (type === 'planar' ? coordinate === 2 : type !== 'prismatic' && coordinate === 0);

@@ -1,6 +1,6 @@
 // The page: a scene that goes on in real time, and a person who reaches into it.
 import { load, Posing } from 'limber/posing';
-import { Engine, openModule } from './engine.js';
+import { openScene } from './engine.js';
 import { download } from './dom.js';
 import { tell } from './message.js';
 import { Panel } from './panel.js';
@@ -38,6 +38,7 @@ class App {
   /** What was seen at rest comes to life. */
   start() {
     this.engine.begin();
+    this.engine.keep();
     this.listen();
     this.seeAll();
   }
@@ -194,7 +195,7 @@ class App {
 
   /** Goes on from what another page was saved with. */
   goOn({ state, view, playing }) {
-    this.engine.restore(bytesOf(state));
+    this.engine.restore(state);
     this.settings = structuredClone(this.engine.scene.settings);
     this.stage.load(this.engine);
     this.panel.build();
@@ -220,12 +221,8 @@ class App {
   showMode(body, mode, share) {
     this.playing = false;
     this.mode = null;
-    this.bend(body, mode, share);
+    this.engine.showMode(body, mode, share);
     this.show();
-  }
-
-  bend(body, mode, share) {
-    this.engine.showMode(body, mode, share * this.engine.scene.models[this.engine.scene.bodies[body].model].visible_amplitudes[mode]);
   }
 
   playMode(body, mode) {
@@ -242,7 +239,7 @@ class App {
         this.step(delay);
     }
     // Modes of any frequency are seen to swing once a second.
-    if (this.mode) this.bend(this.mode.body, this.mode.mode, Math.sin((2e-3 * Math.PI) * (performance.now() - this.mode.began)));
+    if (this.mode) this.engine.showMode(this.mode.body, this.mode.mode, Math.sin((2e-3 * Math.PI) * (performance.now() - this.mode.began)));
     this.hover();
     this.sound.send();
     this.show();
@@ -271,7 +268,7 @@ async function main() {
   stage.prepare();
   const { scene, joints, files, stands } = JSON.parse(document.getElementById('files').textContent);
   const wasm = await unzipped(bytesOf(document.getElementById('engine').textContent));
-  const engine = joints ? await openPosing(wasm, files, scene, joints) : new Engine(await openModule(wasm, files), scene);
+  const engine = joints ? await openPosing(wasm, files, scene, joints) : await openScene(wasm, files, scene);
   document.title = `${engine.scene.name} – limber`;
   const app = joints ? new PoseApp(engine, stage) : new App(engine, stage);
   if (!joints) {

@@ -96,7 +96,7 @@ export class Marks {
   }
 }
 
-/** A shape's surface as models have theirs, without normals. */
+/** A shape's surface as models have theirs. */
 function rigid({ points, triangles }) {
-  return { rest: Float32Array.from(points), normals: new Float32Array(points.length), triangles: Uint32Array.from(triangles) };
+  return { rest: Float32Array.from(points), triangles: Uint32Array.from(triangles) };
 }

@@ -1,6 +1,4 @@
 // The page as it stands, as a page of its own.
-import { base64Of } from './unpack.js';
-
 /** JSON in which no markup can stand, for the inside of a script element. */
 const safe = (value) => JSON.stringify(value).replace(/[<>&]/g, (c) => `\\u00${c.charCodeAt(0).toString(16)}`);
 
@@ -31,7 +29,7 @@ export class Original {
 export function standing(app) {
   const { camera, controls } = app.stage;
   return {
-    state: base64Of(app.engine.saved()),
+    state: app.engine.saved(),
     view: { position: camera.position.toArray(), target: controls.target.toArray() },
     playing: app.playing,
   };

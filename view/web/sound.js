@@ -6,7 +6,7 @@ import { tell } from './message.js';
 
 const HEAD = 0.09;     // m, from the middle to an ear
 const HEADROOM = 0.5;  // of full scale, for the loudest poke as it would be heard from where one looks at first
-const BLOW = 15;        // numbers of a blow, PageWorld::take_blows()
+const BLOW = 15;        // numbers of a blow, Scene's takeBlows()
 
 /** Where a person's ears are who looks through the camera. */
 function ears({ camera }) {

@@ -5,11 +5,11 @@ export const COLOURS = [0xd9822b, 0x3d7ab8, 0x5f9e4f, 0xb0508c, 0x8a6fc1, 0xc2a3
 
 /** What all bodies of a model share. */
 export class SurfaceModel {
-  constructor({ rest, normals, triangles }) {
+  constructor({ rest, triangles }) {
     this.geometry = new THREE.BufferGeometry();
     this.geometry.setAttribute('position', new THREE.BufferAttribute(rest, 3));
-    this.geometry.setAttribute('normal', new THREE.BufferAttribute(normals, 3));
     this.geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+    this.geometry.computeVertexNormals();  // weighted by area, as the engine's
     this.geometry.computeBoundingSphere();
   }
 

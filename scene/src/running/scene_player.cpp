@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "limber/collision/contact_finder.h"
 #include "limber/collision/manifold_finder.h"
@@ -48,14 +49,6 @@ struct MovedBody {
   std::size_t body = 0;
   RigidTransform start;
 };
-
-/// A first pose key at time 0 is where the body starts.
-BodyPlacement start_of(const SceneBody& body) {
-  BodyPlacement placement = body.placement;
-  if (const auto* keys = std::get_if<std::vector<PoseKey>>(&body.movement); keys && keys->front().time == 0.0)
-    placement.pose = keys->front().pose;
-  return placement;
-}
 
 std::unique_ptr<ContactSource> make_finder(SceneFinder which, ContactSolver solver) {
   if (which == SceneFinder::kLimber && solver == ContactSolver::kGame) return std::make_unique<ManifoldFinder>();
@@ -104,12 +97,13 @@ struct PlannedLoads {
 };
 
 struct ScenePlayer::Impl {
-  Impl(const Scene& s, const SceneModels& m, std::int64_t n, Jobs& jobs)
+  Impl(const Scene& s, const SceneModels& m, std::int64_t n, std::unique_ptr<World> owned, World& w)
       : scene(s),
         models(m),
         steps(n),
         finder(make_finder(s.contacts.finder, s.contacts.solver)),
-        world({.step = s.step, .substeps = s.substeps, .gravity = s.gravity, .sleep = s.sleep}, jobs) {
+        own(std::move(owned)),
+        world(w) {
     add_bodies();
     for (std::size_t i = 0; i < scene.statics.size(); ++i) {
       const SceneStatic& standing = scene.statics[i];
@@ -146,7 +140,8 @@ struct ScenePlayer::Impl {
   const SceneModels& models;
   std::int64_t steps = 0, taken = 0;
   std::unique_ptr<ContactSource> finder;  // outlives the world
-  World world;
+  std::unique_ptr<World> own;             // none: the caller's
+  World& world;
   std::vector<BodyId> bodies, statics, sensors;
   std::vector<JointId> joints;
   HeldPoints held;
@@ -249,8 +244,24 @@ void ScenePlayer::Impl::push() {
   }
 }
 
-ScenePlayer::ScenePlayer(const Scene& scene, const SceneModels& models, std::int64_t steps, Jobs& jobs)
-    : impl_(std::make_unique<Impl>(scene, models, steps, jobs)) {}
+BodyPlacement start_of(const SceneBody& body) {
+  BodyPlacement placement = body.placement;
+  if (const auto* keys = std::get_if<std::vector<PoseKey>>(&body.movement); keys && keys->front().time == 0.0)
+    placement.pose = keys->front().pose;
+  return placement;
+}
+
+WorldOptions world_options(const Scene& scene) {
+  return {.step = scene.step, .substeps = scene.substeps, .gravity = scene.gravity, .sleep = scene.sleep};
+}
+
+ScenePlayer::ScenePlayer(const Scene& scene, const SceneModels& models, std::int64_t steps, Jobs& jobs) {
+  auto own = std::make_unique<World>(world_options(scene), jobs);
+  World& world = *own;
+  impl_ = std::make_unique<Impl>(scene, models, steps, std::move(own), world);
+}
+ScenePlayer::ScenePlayer(const Scene& scene, const SceneModels& models, std::int64_t steps, World& world)
+    : impl_(std::make_unique<Impl>(scene, models, steps, nullptr, world)) {}
 ScenePlayer::~ScenePlayer() = default;
 ScenePlayer::ScenePlayer(ScenePlayer&&) noexcept = default;
 ScenePlayer& ScenePlayer::operator=(ScenePlayer&&) noexcept = default;

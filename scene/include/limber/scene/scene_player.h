@@ -44,6 +44,11 @@ struct HandleReport {
   double largest_force = 0.0;  ///< N
 };
 
+/// How a body starts: where a first pose key at time 0 says, if it has one.
+BodyPlacement start_of(const SceneBody& body);
+/// Those of a scene's world.
+WorldOptions world_options(const Scene& scene);
+
 class ScenePlayer {
  public:
   /// Contacts are found by Scene::finder, where the scene has contact.
@@ -52,6 +57,8 @@ class ScenePlayer {
   /// @throws InputError naming the place in the scene file: a motion for a body without fixed nodes. InvalidArgument
   /// where `models` are not those of the scene
   ScenePlayer(const Scene& scene, const SceneModels& models, std::int64_t steps, Jobs& jobs = serial_jobs());
+  /// Plays in a world of the caller's, which is empty, has world_options() and is gone before the player is.
+  ScenePlayer(const Scene& scene, const SceneModels& models, std::int64_t steps, World& world);
   ~ScenePlayer();
   ScenePlayer(ScenePlayer&&) noexcept;
   ScenePlayer& operator=(ScenePlayer&&) noexcept;

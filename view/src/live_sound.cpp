@@ -1,43 +1,38 @@
-#include "page_sound.h"
+#include "live_sound.h"
 
 #include <algorithm>
-#include <string>
-
-#include "limber/core/error.h"
+#include <utility>
 
 namespace limber::internal {
 
-void PageSound::begin(std::span<const PageModel> shown, std::span<const std::shared_ptr<const ModalModel>> kinds) {
-  shown_ = shown;
+void LiveSound::begin(std::vector<std::shared_ptr<const SoundModes>> sounds,
+                      std::span<const std::shared_ptr<const ModalModel>> kinds) {
+  sounds_ = std::move(sounds);
   kinds_ = kinds;
   sounding_.clear();
   sounding_.resize(kinds.size());
   noted_.clear();
 }
 
-void PageSound::listen(bool on) {
+void LiveSound::listen(bool on) {
   listens_ = on;
   noted_.clear();
 }
 
-const SoundingBody& PageSound::sounding(int model) {
-  const auto kind = static_cast<std::size_t>(model);
-  if (kind >= shown_.size() || !shown_[kind].sound)
-    throw InvalidArgument("PageWorld: model " + std::to_string(model) + " has no sound");
-  if (!sounding_[kind]) sounding_[kind] = std::make_unique<SoundingBody>(shown_[kind].sound, kinds_[kind]->collision());
-  return *sounding_[kind];
+const SoundingBody* LiveSound::sounding(std::size_t kind) {
+  if (kind >= sounds_.size() || !sounds_[kind]) return nullptr;
+  if (!sounding_[kind]) sounding_[kind] = std::make_unique<SoundingBody>(sounds_[kind], kinds_[kind]->collision());
+  return sounding_[kind].get();
 }
 
-const SoundingBody* PageSound::sounding_of(std::size_t body, std::span<const PageBody> bodies) {
-  return body < bodies.size() && shown_[static_cast<std::size_t>(bodies[body].model)].sound
-             ? &sounding(bodies[body].model)
-             : nullptr;
+const SoundingBody* LiveSound::sounding_of(std::size_t body, std::span<const LiveScene::Body> bodies) {
+  return body < bodies.size() ? sounding(bodies[body].model) : nullptr;
 }
 
-void PageSound::note_step(const Scene& scene, const ScenePlayer& player, std::span<const PageBody> bodies) {
+void LiveSound::note_step(const Scene& scene, const ScenePlayer& player, std::span<const LiveScene::Body> bodies) {
   std::vector<BodyId> ids;
   std::vector<std::size_t> number_of;
-  for (const PageBody& body : bodies) {
+  for (const LiveScene::Body& body : bodies) {
     number_of.resize(std::max<std::size_t>(number_of.size(), body.id.index + 1), bodies.size());
     number_of[body.id.index] = ids.size();
     ids.push_back(body.id);
@@ -50,7 +45,7 @@ void PageSound::note_step(const Scene& scene, const ScenePlayer& player, std::sp
   for (const BlowRecord& blow : blows_) note(blow, blow.time - start, bodies);
 }
 
-void PageSound::note(const BlowRecord& blow, double delay, std::span<const PageBody> bodies) {
+void LiveSound::note(const BlowRecord& blow, double delay, std::span<const LiveScene::Body> bodies) {
   const SoundingBody* body = sounding_of(blow.body, bodies);
   if (!body) return;
   const StruckPoint at = body->nearest(blow.point);
@@ -63,7 +58,7 @@ void PageSound::note(const BlowRecord& blow, double delay, std::span<const PageB
   noted_.insert(noted_.end(), blow.position.begin(), blow.position.end());
 }
 
-std::span<const double> PageSound::take() {
+std::span<const double> LiveSound::take() {
   taken_.swap(noted_);
   noted_.clear();
   return taken_;
