@@ -6,6 +6,8 @@ function(limber_compile_options target)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast
                                            -Woverloaded-virtual -Wunused)
+  # Sums of products round as they are written, so that compilers give the same bits; kernels say where they fuse them.
+  target_compile_options(${target} PRIVATE -ffp-contract=off)
   # Sources compiled together are included by their whole path: without the clone's part of it in __FILE__, clones share the results.
   target_compile_options(${target} PRIVATE -fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
