@@ -26,7 +26,7 @@ double swing_per_field(const ModalModelData& body) {
   return (body.inertia.inverse() * cross_matrix(s)).norm();
 }
 
-bool turns_locked(const AxisLocks& locks) { return locks.rotation != std::array<bool, 3>{}; }
+bool turns_locked(const AxisLocks& locks) { return locks.rotation[0] || locks.rotation[1] || locks.rotation[2]; }
 
 Mat3 inertia_in_world(const FrameConstants& c, const Quaternion& q_WB) {
   const Mat3 R = to_matrix(q_WB);

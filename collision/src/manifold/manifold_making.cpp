@@ -27,10 +27,10 @@ constexpr internal::FeatureKey kInside = 0xffffffffu;  // a body's inner ball: o
 PairQuery ManifoldFinder::Impl::query_of(const BodyPair& pair) const {
   const ManifoldBody &a = at(pair.a), &b = at(pair.b);
   PairQuery q{.index_a = pair.a, .index_b = pair.b, .a = a, .b = b, .state_a = state(pair.a), .state_b = state(pair.b)};
-  const Quaternion to_a = a.pose.q.conjugate();
-  q.X_AB = {to_a * b.pose.q, to_a * (b.pose.p - a.pose.p)};
+  q.X_AB = {a.pose.q.conjugate() * b.pose.q, a.turn.transpose() * (b.pose.p - a.pose.p)};
   q.X_LS = a.radius <= b.radius ? q.X_AB.inverse() : q.X_AB;
-  q.passing = {to_a * (a.displacement - b.displacement), options.flush * std::min(a.thickness, b.thickness)};
+  q.passing = {a.turn.transpose() * (a.displacement - b.displacement),
+               options.flush * std::min(a.thickness, b.thickness)};
   if (a.placed_asleep != b.placed_asleep) q.passing.ground = a.placed_asleep ? 0 : 1;
   q.reach = query.margin + a.reach + b.reach + q.passing.way.norm();
   if (by_fields(pair)) expect(q);

@@ -161,7 +161,7 @@ bool ConvexContacts::faces_tell(double margin) {
   const double radii = side_[0].core->radius + side_[1].core->radius;
   if (-face.depth - radii > margin) return true;
   if (face.depth > 0.0) {
-    const Direction least = least_penetration();
+    const Direction least = least_penetration(face);
     if (least.depth < 0.0) return false;
     touch(least, nullptr, margin);
     return true;
@@ -178,7 +178,7 @@ void ConvexContacts::find_by_distance(double margin) {
   if (!(nearest.distance <= most)) return;
   // Cores that are apart by little more than round-off may have any normal by their nearest points.
   if (nearest.cores_intersect || !(depth_along(nearest.normal) < 0.0)) {
-    touch(least_penetration(), nullptr, margin);
+    touch(least_penetration(across_faces()), nullptr, margin);
     return;
   }
   const Deepest points{nearest.a, nearest.b};
@@ -251,8 +251,8 @@ void ConvexContacts::for_edges(const Visit& visit) const {
 }
 
 // The separating axis test over all faces and pairs of edges: the nearest face of the difference of the two polytopes.
-ConvexContacts::Direction ConvexContacts::least_penetration() const {
-  Direction best = across_faces();
+ConvexContacts::Direction ConvexContacts::least_penetration(const Direction& across_faces) const {
+  Direction best = across_faces;
   const double preference = collision_tuning().convex.edge_preference;
   for_edges([&](const Vec3& normal, double depth) { take_shallower(best, normal, depth, preference); });
   if (!std::isfinite(best.depth)) {

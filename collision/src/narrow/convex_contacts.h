@@ -116,7 +116,7 @@ class ConvexContacts {
   template <class Visit>
   void for_faces(const Visit& visit) const;
   Direction across_faces() const;
-  Direction least_penetration() const;
+  Direction least_penetration(const Direction& across_faces) const;
   template <class Visit>
   void for_edges(const Visit& visit) const;
   bool leave_triangle(Direction& best, DirectionFilter& leaves) const;
