@@ -4,6 +4,7 @@ import { readFileSync } from 'node:fs';
 import { LimberError } from 'limber';
 import { load, Scene } from 'limber/scene';
 import { Engine } from './engine.js';
+import { History } from './history.js';
 
 const GRAVITY = 9.80665;
 const [, , folder] = process.argv, files = { 'markup.json': readFileSync(`${folder}/markup.json`), 'block.glb': readFileSync(`${folder}/block.glb`) };
@@ -92,6 +93,23 @@ const velocity = (engine, body) => engine.world.bodyState(engine.played.bodies[b
   assert.equal(engine.scene.bodies.length, bodies - 1);
   engine.goTo(engine.kept() - 1);
   assert.deepEqual([engine.hash(), engine.scene.bodies.length], [there, bodies]);
+}
+{ // a long past gets coarser, and does not end
+  const engine = begun();
+  engine.history = new History(20 * engine.history.bytes);
+  engine.keep();
+  const hashes = [engine.hash()];
+  for (let i = 0; i < 100; ++i) {
+    engine.step();
+    hashes.push(engine.hash());
+  }
+  const kept = Array.from({ length: engine.kept() }, (_, key) => engine.keptStep(key));
+  assert.ok(kept.length <= 20 && kept.length >= 5, `${kept.length} states`);
+  assert.deepEqual([kept[0], kept.at(-1)], [0, 100]);
+  for (const [key, at] of kept.entries()) {
+    engine.goTo(key);
+    assert.equal(engine.hash(), hashes[at]);
+  }
 }
 { // what becomes stiffer goes on from where it is, as fast
   const engine = begun();
