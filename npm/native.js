@@ -146,7 +146,7 @@ function array_(type, items, name) {
   return address;
 }
 
-export function text(address) {
+function text(address) {
   const end = wasm.HEAPU8.indexOf(0, address);
   return new TextDecoder().decode(wasm.HEAPU8.slice(address, end));
 }

@@ -53,8 +53,8 @@ export class Scene extends Native {
   }
 
   /** What a call leaves as its answer. @param act of the module */
-  view(act, Type, ...given) {
-    call(act, ...given);
+  view(act, Type) {
+    call(act);
     const [at, count] = new Uint32Array(loaded().HEAPU8.buffer, loaded()._scene_answer(this.pointer), 2);
     return new Type(loaded().HEAPU8.buffer, count === 0 ? 0 : at, count);
   }
