@@ -19,7 +19,7 @@ std::vector<Eigen::Quaterniond> turned_by(const std::array<double, kFramesAtOnce
   std::vector<FrameShift> shifts(kFramesAtOnce);
   for (std::size_t l = 0; l < kFramesAtOnce; ++l) {
     frames.first[l] = static_cast<std::int32_t>(l);
-    frames.per_root.v[l] = frames.now.attitude[0].v[l] = 1.0;
+    frames.turns_axes.v[l] = 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
       frames.turn_scale[i][i].v[l] = 1.0;
       frames.now.free_turn[i].v[l] = angles[l] * axis[static_cast<Eigen::Index>(i)];

@@ -32,6 +32,11 @@ HWY_INLINE HWY_ATTR void Put(Wide x, Block8& to, std::size_t lane) {
   hn::Store(hn::DemoteTo(Singles(), x), Singles(), to.v + lane);
 }
 
+/// Of the bodies' lanes, which come first.
+HWY_INLINE HWY_ATTR bool HasBody(const EightFrames& f, std::size_t lane) {
+  return lane < kFramesAtOnce && f.first[lane] >= 0;
+}
+
 /// M x, or Mᵀ x.
 HWY_INLINE HWY_ATTR void Multiply(const Double8 (&m)[3][3], bool transposed, const Wide* x, std::size_t lane,
                                   Wide* to) {
@@ -297,7 +302,7 @@ HWY_INLINE HWY_ATTR void TurnLanes(EightFrames& f, double time, std::size_t lane
 
 HWY_ATTR void TurnFrames(const FrameArrays& all, double time) {
   for (std::size_t g = 0; g < all.count; ++g)
-    for (std::size_t lane = 0; lane < kFramesAtOnce; lane += kDoubles) TurnLanes(all.frames[g], time, lane);
+    for (std::size_t lane = 0; HasBody(all.frames[g], lane); lane += kDoubles) TurnLanes(all.frames[g], time, lane);
 }
 
 /// Where rows are of an attitude that the body has left, its momentum no longer tells how it turns: by the inertia in
@@ -346,8 +351,8 @@ HWY_ATTR void BeginFrames(const FrameArrays& all) {
   for (std::size_t g = 0; g < all.count; ++g) {
     EightFrames& f = all.frames[g];
     Block8 told[12], free[8];
-    for (std::size_t lane = 0; lane < kFramesAtOnce; lane += kDoubles) BeginLanes(f, all.length, lane, told, free);
-    for (std::size_t l = 0; l < kFramesAtOnce && f.first[l] >= 0; ++l) {
+    for (std::size_t lane = 0; HasBody(f, lane); lane += kDoubles) BeginLanes(f, all.length, lane, told, free);
+    for (std::size_t l = 0; HasBody(f, l); ++l) {
       FrameShift& shift = all.shifts[kFramesAtOnce * g + l];
       for (std::size_t i = 0; i < 3; ++i) shift.shift[i] = told[i].v[l];
       for (std::size_t i = 0; i < 9; ++i) shift.turned[i] = told[3 + i].v[l];
@@ -400,14 +405,14 @@ HWY_ATTR void EndFrames(const FrameArrays& all, bool pushed) {
   for (std::size_t g = 0; g < all.count; ++g) {
     EightFrames& f = all.frames[g];
     Block8 change[8], push[8];
-    for (std::size_t l = 0; l < kFramesAtOnce && f.first[l] >= 0; ++l)
+    for (std::size_t l = 0; HasBody(f, l); ++l)
       for (std::size_t i = 0; i < 8; ++i) {
         const float by = all.motion[f.first[l]].v[i] - all.free[f.first[l]].v[i];
         all.answers[f.first[l]].v[i] = by;
         change[i].v[l] = by;
         push[i].v[l] = pushed ? all.pushes[kFramesAtOnce * g + l].v[i] : 0.0f;
       }
-    for (std::size_t lane = 0; lane < kFramesAtOnce; lane += kDoubles) EndLanes(f, all.length, lane, change, push);
+    for (std::size_t lane = 0; HasBody(f, lane); lane += kDoubles) EndLanes(f, all.length, lane, change, push);
   }
 }
 
@@ -437,7 +442,7 @@ HWY_INLINE HWY_ATTR void PlaceLanes(EightFrames& f, double h, bool again, std::s
 
 HWY_ATTR void PlaceFrames(const FrameArrays& all, bool again) {
   for (std::size_t g = 0; g < all.count; ++g)
-    for (std::size_t lane = 0; lane < kFramesAtOnce; lane += kDoubles)
+    for (std::size_t lane = 0; HasBody(all.frames[g], lane); lane += kDoubles)
       PlaceLanes(all.frames[g], all.length, again, lane);
 }
 

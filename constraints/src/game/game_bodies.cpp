@@ -116,6 +116,7 @@ void GameBodies::place_frame(std::size_t at, const RigidFrame& frame) {
   put(q, of.now.attitude, lane);
   put(frame.velocity(), of.now.v, lane);
   of.loads.left.v[lane] = of.loads.turn_left.v[lane] = 1.0;
+  of.turns_axes.v[lane] = of.per_root.v[lane] = 0.0;
   body.turns_locked = frame.settings().locks.rotation != AxisLocks{}.rotation;
   if (c.motion == FrameMotion::kKinematic) return;
   for (std::size_t i = 0; i < 3; ++i)
