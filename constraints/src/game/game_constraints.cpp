@@ -17,11 +17,16 @@ constexpr double kRounded = 1e-9;
 using Hold = GameRow::Hold;
 
 /// Of one block of coordinates.
-Eigen::Map<Eigen::Array<double, 8, 1>> eight(std::vector<double>& from, std::int32_t block) {
-  return Eigen::Map<Eigen::Array<double, 8, 1>>(&from[static_cast<std::size_t>(8 * block)]);
+Eigen::Map<Eigen::Array<double, 8, 1>, Eigen::Aligned64> eight(std::vector<Double8>& from, std::int32_t block) {
+  return Eigen::Map<Eigen::Array<double, 8, 1>, Eigen::Aligned64>(from[static_cast<std::size_t>(block)].v);
 }
-Eigen::Map<Eigen::Array<float, 8, 1>> eight(std::vector<Block8>& from, std::int32_t block) {
-  return Eigen::Map<Eigen::Array<float, 8, 1>>(from[static_cast<std::size_t>(block)].v);
+Eigen::Map<Eigen::Array<float, 8, 1>, Eigen::Aligned32> eight(std::vector<Block8>& from, std::int32_t block) {
+  return Eigen::Map<Eigen::Array<float, 8, 1>, Eigen::Aligned32>(from[static_cast<std::size_t>(block)].v);
+}
+
+/// Of one body.
+double* numbers_of(std::vector<Double8>& of_all, const RowBody& body) {
+  return of_all[static_cast<std::size_t>(body.first)].v;
 }
 
 /// A force within its row's bounds.
@@ -56,7 +61,7 @@ void GameConstraints::solve(GameBodies& bodies) {
   if (rows_.groups().empty()) return;
   rows_.add_what_leads(bodies);
   if (std::ranges::any_of(rows_.groups(), [](const GameGroup& group) { return group.constraint->counts_work(); })) {
-    slopes_.assign(rows_.coordinates(), 0.0);
+    slopes_.assign(rows_.blocks(), {});
     rows_.add_energy_slopes(bodies, system_.bodies(), bodies.free_motion(), {}, slopes_);
   } else {
     slopes_.clear();
@@ -74,7 +79,7 @@ void GameConstraints::solve(GameBodies& bodies) {
 /// whose single precision would lose what rounds find whose rows contradict.
 void GameConstraints::solve_once() {
   const std::span<GameRow> rows = rows_.rows();
-  moved_.assign(rows_.coordinates(), 0.0);
+  moved_.assign(rows_.blocks(), {});
   forces_.assign(rows.size(), 0.0);
   if (rows_.any_bounded() && std::ranges::any_of(rows, [](const GameRow& r) { return r.hold != Hold::kMet; })) {
     for (std::size_t i = 0; i < rows.size(); ++i)
@@ -124,14 +129,14 @@ bool GameConstraints::let_go(bool takes_hold) {
 void GameConstraints::take(std::vector<Block8>& motion) {
   taken_.assign(system_.components(), 0.0);
   limits_.assign(system_.components(), {});
-  y_.resize(rows_.coordinates());
+  y_.resize(rows_.blocks());
   for (const RowBody& body : system_.bodies()) {
     double& sum = taken_[static_cast<std::size_t>(body.component)];
     for (std::int32_t b = body.first; b < body.first + body.blocks; ++b) {
       sum += eight(moved_, b).square().sum();
       eight(y_, b) = eight(motion, b).cast<double>();
     }
-    rows_.unscale(body, moved_.data() + 8 * body.first);
+    rows_.unscale(body, numbers_of(moved_, body));
   }
   for (std::size_t i = 0; i < forces_.size(); ++i) forces_[i] = rows_.rows()[i].force;
   limit_change(moved_);
@@ -142,7 +147,7 @@ void GameConstraints::take(std::vector<Block8>& motion) {
 
 /// Of y_, by forces_: leaves as much of y_ + change as has the energy of limits_ and what the targets' rates give. Rows
 /// that meet them give no more, but for the scales of turns.
-void GameConstraints::limit_change(std::vector<double>& change) {
+void GameConstraints::limit_change(std::vector<Double8>& change) {
   const std::span<const GameGroup> groups = rows_.groups();
   for (std::size_t g = 0; g < groups.size(); ++g) {
     double given = 0.0;
@@ -235,8 +240,8 @@ void GameConstraints::find_shares() {
 /// By what close() has found.
 void GameConstraints::displace(GameBodies& bodies) {
   const std::span<const GameGroup> groups = rows_.groups();
-  speed_.assign(rows_.coordinates(), 0.0);
-  place_.assign(rows_.coordinates(), 0.0);
+  speed_.assign(rows_.blocks(), {});
+  place_.assign(rows_.blocks(), {});
   forces_.assign(rows_.rows().size(), 0.0);
   products_.assign(rows_.rows().size(), 0.0);
   for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -262,8 +267,8 @@ void GameConstraints::displace(GameBodies& bodies) {
 void GameConstraints::limit_speeds(const GameBodies& bodies) {
   for (Limit& limit : limits_) limit = {.most = std::max(0.0, limit.most - limit.has)};
   for (const RowBody& body : system_.bodies()) {
-    bodies.write_motion(body.frame, y_.data() + 8 * body.first);
-    rows_.unscale(body, speed_.data() + 8 * body.first);
+    bodies.write_motion(body.frame, numbers_of(y_, body));
+    rows_.unscale(body, numbers_of(speed_, body));
   }
   limit_change(speed_);
 }
@@ -271,7 +276,7 @@ void GameConstraints::limit_speeds(const GameBodies& bodies) {
 /// By speed_ and place_. @param speeds whether there are any
 void GameConstraints::move(GameBodies& bodies, bool speeds) {
   for (const RowBody& body : system_.bodies()) {
-    double *speed = speed_.data() + 8 * body.first, *place = place_.data() + 8 * body.first;
+    double *speed = numbers_of(speed_, body), *place = numbers_of(place_, body);
     rows_.unscale(body, place);
     bodies.displace(body.frame, speed, place);
   }
@@ -340,10 +345,10 @@ bool GameConstraints::find_closing_shares() {
 void GameConstraints::shorten_closing(GameBodies& bodies) {
   for (const RowBody& body : system_.bodies()) {
     const double back = given_[static_cast<std::size_t>(body.component)] - 1.0;
-    double* place = place_.data() + 8 * body.first;
+    double* place = numbers_of(place_, body);
     if (back == 0.0) continue;
     for (std::int32_t l = 0; l < 8 * body.blocks; ++l) place[l] *= back;
-    bodies.displace(body.frame, speed_.data() + 8 * body.first, place);
+    bodies.displace(body.frame, numbers_of(speed_, body), place);
   }
   end_moving(bodies, false);
 }
@@ -372,8 +377,8 @@ void GameConstraints::close_errors(GameBodies& bodies) {
     right_[k] = row.keeps_place ? -row.error : 0.0;
   });
   system_.solve_fully(rows_, asked_, right_);
-  speed_.assign(rows_.coordinates(), 0.0);
-  place_.assign(rows_.coordinates(), 0.0);
+  speed_.assign(rows_.blocks(), {});
+  place_.assign(rows_.blocks(), {});
   forces_.assign(rows_.rows().size(), 0.0);
   system_.for_met(rows_, [&](std::size_t i, std::size_t k) { forces_[i] = rows_.rows()[i].closing = right_[k]; });
   rows_.add_transposed(forces_, place_);

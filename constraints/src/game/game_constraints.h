@@ -27,7 +27,7 @@ class GameConstraints {
   void solve(GameBodies& bodies);
   /// y by solve(), by body; none without rows.
   std::span<const double> moved() const {
-    return rows_.groups().empty() ? std::span<const double>{} : std::span<const double>(moved_);
+    return rows_.groups().empty() ? std::span<const double>{} : std::span(moved_.front().v, 8 * moved_.size());
   }
   /// Once the bodies have moved: closes what is open there. @param pushed whether GameBodies::pushes() moved them
   void close(const BodyStates& states, GameBodies& bodies, bool pushed);
@@ -50,7 +50,7 @@ class GameConstraints {
   void find_shares();
   void displace(GameBodies& bodies);
   void move(GameBodies& bodies, bool speeds);
-  void limit_change(std::vector<double>& change);
+  void limit_change(std::vector<Double8>& change);
   void limit_speeds(const GameBodies& bodies);
   void end_moving(GameBodies& bodies, bool speeds);
   void close_step(const BodyStates& states, GameBodies& bodies);
@@ -61,12 +61,12 @@ class GameConstraints {
 
   GameRows rows_;
   RowSystem system_;
-  std::vector<double> motion_, moved_;  // of the bodies, in the rows' coordinates: all of it; what the rows did
-  std::vector<double> slopes_;  // of energies, before all impulses of the substep and after them; none: nobody asks
+  std::vector<Double8> motion_, moved_;  // of the bodies, in the rows' coordinates: all of it; what the rows did
+  std::vector<Double8> slopes_;  // of energies, before all impulses of the substep and after them; none: nobody asks
   std::vector<double> taken_, given_;             // energies by component
   std::vector<double> right_, asked_;             // of the system
-  std::vector<double> speed_, place_, pushes_;    // in the rows' coordinates
-  std::vector<double> y_;                         // a motion, in the bodies' coordinates
+  std::vector<Double8> speed_, place_, pushes_;   // in the rows' coordinates
+  std::vector<Double8> y_;                        // a motion, in the bodies' coordinates
   std::vector<double> gaps_, forces_, products_;  // by row: scratch; products_ keeps J motion_ of a solution
   std::vector<Closing> closings_;                 // by component
   std::vector<Limit> limits_;                     // likewise

@@ -12,27 +12,8 @@ namespace {
 using Hold = GameRow::Hold;
 constexpr double kRecoverySpeed = kConstraintsTuning.small_steps.recovery_speed;
 
-/// A block of a row or of coordinates; of a frame's eight, six are used.
-template <int count>
-using Block = Eigen::Matrix<double, count, 1>;
-template <int count>
-Eigen::Map<const Block<count>> block(const double* at) {
-  return Eigen::Map<const Block<count>>(at);
-}
-
 /// By component, as cross_component().
 double inner(const Vec3& u, const Vec3& v) { return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]; }
-
-/// x += Σ f row of a block. @param next from row to row
-template <int count>
-inline void add_rows(const double* row, std::int32_t next, const double* forces, std::size_t rows, double* x) {
-  Eigen::Map<Block<count>> to(x);
-  std::size_t i = 0;
-  for (; i + 3 <= rows; i += 3, row += 3 * next)  // those of a ball joint in one pass
-    to += forces[i] * block<count>(row) + forces[i + 1] * block<count>(row + next) +
-          forces[i + 2] * block<count>(row + 2 * next);
-  for (; i < rows; ++i, row += next) to += forces[i] * block<count>(row);
-}
 
 }  // namespace
 
@@ -40,7 +21,7 @@ void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::spa
                     int number) {
   const SubstepPlan& plan = bodies.plan();
   length_ = plan.length();
-  coordinates_ = 8 * bodies.motion().size();
+  blocks_ = bodies.motion().size();
   scales_.assign(bodies.bodies().size(), {});
   led_.clear();
   if (number == 0) rows_.clear(), groups_.clear(), numbers_.clear();
@@ -74,8 +55,10 @@ void GameRows::linearise(const BodyStates& states, Constraint* constraint) {
 }
 
 void GameRows::add_group(const GameBodies& bodies, Constraint* constraint) {
-  const auto count = static_cast<std::size_t>(made_.size());
-  GameGroup group{.constraint = constraint, .first = rows_.size(), .count = count, .sides = {}};
+  GameGroup group{.constraint = constraint,
+                  .first = static_cast<std::uint32_t>(rows_.size()),
+                  .count = static_cast<std::uint32_t>(made_.size()),
+                  .sides = {}};
   for (Index i = 0; i < made_.size(); ++i) rows_.push_back({.force = made_.row(i).law.last_force});
   for (std::size_t s = 0; s < 2 && group.count > 0; ++s) {
     GameSide& side = group.sides[s];
@@ -83,9 +66,9 @@ void GameRows::add_group(const GameBodies& bodies, Constraint* constraint) {
     if (side.frame < 0) continue;
     const GameBody& body = bodies.body(side.frame);
     side.body = body.first;
-    side.coordinates = 8 * body.blocks;
-    side.at = numbers_.size();
-    numbers_.resize(numbers_.size() + group.count * static_cast<std::size_t>(side.coordinates));
+    side.blocks = body.blocks;
+    side.at = static_cast<std::int32_t>(numbers_.size());
+    numbers_.resize(numbers_.size() + group.count * static_cast<std::size_t>(side.blocks));
   }
   groups_.push_back(group);
 }
@@ -98,9 +81,10 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
     const GameBody& body = bodies.body(side.frame);
     const Vec3 shift = body.root_mass > 0.0 ? Vec3(length_ / body.root_mass * body.goes) : Vec3(Vec3::Zero());
     const Mat3 turn = length_ * body.turn_scale;
-    double* to = &numbers_[side.at];
+    Double8* row_of_body = &numbers_[static_cast<std::size_t>(side.at)];
     Pull pull;
-    for (std::size_t i = 0; i < group.count; ++i, to += side.coordinates) {
+    for (std::size_t i = 0; i < group.count; ++i, row_of_body += side.blocks) {
+      double* to = row_of_body->v;
       const ConstraintRows::Side& from = made_.row(static_cast<Index>(i)).sides[s];
       const GameRow& row = rows_[group.first + i];
       const double by = closing ? row.closing : row.force;
@@ -115,7 +99,7 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
         const std::span<const double> modal = made_.modal(from);
         for (std::size_t m = 0; m < modal.size(); ++m)
           to[8 + m] = modal[m] * static_cast<double>(body.modes->roots()[m]);
-        std::fill(to + 8 + modal.size(), to + side.coordinates, 0.0);
+        std::fill(to + 8 + modal.size(), to + 8 * side.blocks, 0.0);
       }
       if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
     }
@@ -156,9 +140,9 @@ void GameRows::scale_turns() {
       if (side.frame < 0) continue;
       const Turns& scale = scales_[static_cast<std::size_t>(side.frame)];
       const double by[3] = {1.0 / scale[0], 1.0 / scale[1], 1.0 / scale[2]};
-      double* row = &numbers_[side.at];
-      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates)
-        for (std::size_t k = 0; k < 3; ++k) row[3 + k] *= by[k];
+      Double8* row = &numbers_[static_cast<std::size_t>(side.at)];
+      for (std::size_t i = 0; i < group.count; ++i, row += side.blocks)
+        for (std::size_t k = 0; k < 3; ++k) row->v[3 + k] *= by[k];
     }
 }
 
@@ -170,9 +154,10 @@ void GameRows::write_row(const GameBodies& bodies, const GameGroup& group, std::
   row.target = row.rate = h * law.end_rate;
   row.compliance = h * law.compliance;
   for (const GameSide& side : group.sides)
-    for (std::int32_t k = 8; k < side.coordinates; k += 8) {
-      const Block8& shape = bodies.shapes()[static_cast<std::size_t>(side.body + k / 8)];
-      row.target += block<8>(numbers(side, static_cast<std::int32_t>(i)) + k)
+    for (std::int32_t b = 1; b < side.blocks; ++b) {
+      const Block8& shape = bodies.shapes()[static_cast<std::size_t>(side.body + b)];
+      const auto at = static_cast<std::size_t>(side.at + static_cast<std::int32_t>(i) * side.blocks + b);
+      row.target += Eigen::Map<const Eigen::Matrix<double, 8, 1>>(numbers_[at].v)
                         .dot(Eigen::Map<const Eigen::Matrix<float, 8, 1>>(shape.v).cast<double>());
     }
   const bool bounded = row.is_bounded(), from_below = law.lower == 0.0, from_above = law.upper == 0.0,
@@ -214,10 +199,10 @@ void GameRows::add_what_leads(const GameBodies& bodies) {
 
 // Products ------------------------------------------------------------------------------------------------------------
 
-void GameRows::scale(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<double>& x) const {
-  x.resize(coordinates_);
+void GameRows::scale(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<Double8>& x) const {
+  x.resize(blocks_);
   for (const RowBody& body : at) {
-    double* to = &x[static_cast<std::size_t>(8 * body.first)];
+    double* to = x[static_cast<std::size_t>(body.first)].v;
     for (std::int32_t b = 0; b < body.blocks; ++b)
       for (int l = 0; l < 8; ++l) to[8 * b + l] = static_cast<double>(y[static_cast<std::size_t>(body.first + b)].v[l]);
     for (std::size_t k = 0; k < 3; ++k) to[3 + k] *= scales_[static_cast<std::size_t>(body.frame)][k];
@@ -225,53 +210,36 @@ void GameRows::scale(std::span<const RowBody> at, const std::vector<Block8>& y, 
 }
 
 void GameRows::add_energy_slopes(const GameBodies& bodies, std::span<const RowBody> at, const std::vector<Block8>& y,
-                                 std::span<const double> more, std::vector<double>& slopes) {
+                                 std::span<const Double8> more, std::vector<Double8>& slopes) {
   for (const RowBody& body : at) {
     slope_.resize(static_cast<std::size_t>(8 * body.blocks));
     bodies.write_energy_slopes(body.frame, y, slope_.data());
     for (std::size_t l = 0; l < 6 && !more.empty(); ++l)
-      slope_[l] += more[static_cast<std::size_t>(8 * body.first) + l];
+      slope_[l] += more[static_cast<std::size_t>(body.first)].v[l];
     unscale(body, slope_.data());
-    double* to = &slopes[static_cast<std::size_t>(8 * body.first)];
+    double* to = slopes[static_cast<std::size_t>(body.first)].v;
     for (std::size_t l = 0; l < slope_.size(); ++l) to[l] += slope_[l];
   }
 }
 
 void GameRows::scale_pushes(std::span<const RowBody> at, const std::vector<Block8>& pushes,
-                            std::vector<double>& x) const {
-  x.assign(coordinates_, 0.0);
+                            std::vector<Double8>& x) const {
+  x.assign(blocks_, {});
   for (const RowBody& body : at) {
     const auto frame = static_cast<std::size_t>(body.frame);
-    double* to = &x[static_cast<std::size_t>(8 * body.first)];
+    double* to = x[static_cast<std::size_t>(body.first)].v;
     for (std::size_t l = 0; l < 6; ++l)
       to[l] = static_cast<double>(pushes[frame].v[l]) * (l < 3 ? 1.0 : scales_[frame][l - 3]);
   }
 }
 
-void GameRows::multiply(std::span<const double> x, std::vector<double>& product) const {
-  product.assign(rows_.size(), 0.0);
-  for (const GameGroup& group : groups_)
-    for (const GameSide& side : group.sides) {
-      if (side.frame < 0) continue;
-      const double *row = numbers(side, 0), *from = x.data() + 8 * side.body;
-      for (std::size_t i = 0; i < group.count; ++i, row += side.coordinates) {
-        double sum = block<6>(row).dot(block<6>(from));
-        for (std::int32_t k = 8; k < side.coordinates; k += 8) sum += block<8>(row + k).dot(block<8>(from + k));
-        product[group.first + i] += sum;
-      }
-    }
+void GameRows::multiply(std::span<const Double8> x, std::vector<double>& product) const {
+  product.resize(rows_.size());
+  multiply_rows(arrays(), x.data(), product.data());
 }
 
-void GameRows::add_transposed(std::span<const double> forces, std::span<double> x) const {
-  for (const GameGroup& group : groups_)
-    for (const GameSide& side : group.sides) {
-      if (side.frame < 0) continue;
-      const double *row = numbers(side, 0), *force = forces.data() + group.first;
-      double* to = x.data() + 8 * side.body;
-      add_rows<6>(row, side.coordinates, force, group.count, to);
-      for (std::int32_t k = 8; k < side.coordinates; k += 8)
-        add_rows<8>(row + k, side.coordinates, force, group.count, to + k);
-    }
+void GameRows::add_transposed(std::span<const double> forces, std::span<Double8> x) const {
+  add_transposed_rows(arrays(), forces.data(), x.data());
 }
 
 }  // namespace limber::internal

@@ -5,12 +5,12 @@
 // rule. Without that a link that turns to and fro faster than 2 radians a substep would be thrown about.
 #pragma once
 
-#include <array>
 #include <span>
 #include <vector>
 
 #include "game_bodies.h"
 #include "limber/constraints/constraint.h"
+#include "row_kernels.h"
 
 namespace limber::internal {
 
@@ -35,19 +35,6 @@ struct GameRow {
   bool is_bounded() const { return lower != -kUnbounded || upper != kUnbounded; }
 };
 
-/// A body in the rows of one constraint: as many numbers a row as it has coordinates.
-struct GameSide {
-  std::int32_t frame = -1, coordinates = 0, body = 0;  // −1: none. body: the first block of its coordinates
-  std::size_t at = 0;                                  // of the first row in numbers()
-};
-
-/// The rows of one constraint.
-struct GameGroup {
-  Constraint* constraint = nullptr;
-  std::size_t first = 0, count = 0;  // of its rows
-  std::array<GameSide, 2> sides;
-};
-
 /// A body that rows act on, and the number of those that rows join it to.
 struct RowBody {
   std::int32_t frame = 0, first = 0, blocks = 0, component = 0;
@@ -67,31 +54,28 @@ class GameRows {
   std::span<const GameRow> rows() const { return rows_; }
   std::span<const GameGroup> groups() const { return groups_; }
   std::span<GameRow> of(const GameGroup& group) { return std::span(rows_).subspan(group.first, group.count); }
-  std::size_t coordinates() const { return coordinates_; }  ///< of all bodies
-  bool any_bounded() const { return any_bounded_; }         ///< whether any row is
+  std::size_t blocks() const { return blocks_; }     ///< of all bodies' coordinates, and one that stands
+  bool any_bounded() const { return any_bounded_; }  ///< whether any row is
   /// s, the substep
   double length() const { return length_; }
-  /// Of one row. @param side of its group
-  const double* numbers(const GameSide& side, std::int32_t row) const {
-    return numbers_.data() + side.at + static_cast<std::size_t>(row * side.coordinates);
-  }
+  const Double8* numbers() const { return numbers_.data(); }  ///< J
 
-  // Vectors have eight numbers for each block of the bodies' coordinates.
+  // Vectors have the blocks of the bodies' coordinates.
   /// x of y. @param at where, others are left as they are
-  void scale(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<double>& x) const;
+  void scale(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<Double8>& x) const;
   /// The same of GameBodies::pushes().
-  void scale_pushes(std::span<const RowBody> at, const std::vector<Block8>& pushes, std::vector<double>& x) const;
+  void scale_pushes(std::span<const RowBody> at, const std::vector<Block8>& pushes, std::vector<Double8>& x) const;
   /// slopes += those of the bodies' energies, J for a unit of x. @param y, more whose sum the frames have
   void add_energy_slopes(const GameBodies& bodies, std::span<const RowBody> at, const std::vector<Block8>& y,
-                         std::span<const double> more, std::vector<double>& slopes);
+                         std::span<const Double8> more, std::vector<Double8>& slopes);
   /// y of x in its place, of one body's numbers.
   void unscale(const RowBody& body, double* y) const {
     for (std::size_t k = 0; k < 3; ++k) y[3 + k] /= scales_[static_cast<std::size_t>(body.frame)][k];
   }
   /// J x. @param product one number for each row
-  void multiply(std::span<const double> x, std::vector<double>& product) const;
+  void multiply(std::span<const Double8> x, std::vector<double>& product) const;
   /// x += Jᵀ f. @param forces likewise
-  void add_transposed(std::span<const double> forces, std::span<double> x) const;
+  void add_transposed(std::span<const double> forces, std::span<Double8> x) const;
 
  private:
   /// A body that something leads, in a row.
@@ -115,15 +99,16 @@ class GameRows {
   void write_row(const GameBodies& bodies, const GameGroup& group, std::size_t i);
   void hold(const GameGroup& group, double step);
   void scale_turns();
+  RowArrays arrays() const { return {groups_.data(), groups_.size(), numbers_.data()}; }
 
   std::vector<GameRow> rows_;
   std::vector<GameGroup> groups_;
-  std::vector<double> numbers_;  // J
-  std::vector<Turns> scales_;    // by frame: x/y of its turn
+  std::vector<Double8> numbers_;  // J
+  std::vector<Turns> scales_;     // by frame: x/y of its turn
   std::vector<Led> led_;
   ConstraintRows made_;
   std::vector<double> slope_;  // scratch
-  std::size_t coordinates_ = 0;
+  std::size_t blocks_ = 0;
   double length_ = 0.0;
   bool any_bounded_ = false;
 };

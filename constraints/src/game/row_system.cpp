@@ -10,31 +10,6 @@ namespace {
 
 using Hold = GameRow::Hold;
 
-double dot(const double* a, const double* b, std::int32_t count) {
-  double sum[4] = {};
-  for (std::int32_t i = 0; i < count; i += 4)
-    for (int l = 0; l < 4; ++l) sum[l] += a[i + l] * b[i + l];
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
-}
-
-/// sum += a bᵀ of three rows each, of two coordinates: of the lower part alone, if a is b.
-template <bool lower>
-inline void add_pair_products(const double* a, const double* b, std::int32_t next, double (&sum)[3][3][2]) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < (lower ? i + 1 : 3); ++j)
-      for (int m = 0; m < 2; ++m) sum[i][j][m] += a[next * i + m] * b[next * j + m];
-}
-
-/// to += a bᵀ of three rows each, one after the other; of a frame's coordinates six are used.
-template <bool lower>
-void add_ball_products(const double* a, const double* b, std::int32_t coordinates, double* to) {
-  double sum[3][3][2] = {};
-  for (std::int32_t k = 0; k < 6; k += 2) add_pair_products<lower>(a + k, b + k, coordinates, sum);
-  for (std::int32_t k = 8; k < coordinates; k += 2) add_pair_products<lower>(a + k, b + k, coordinates, sum);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < (lower ? i + 1 : 3); ++j) to[3 * i + j] += sum[i][j][0] + sum[i][j][1];
-}
-
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
@@ -104,8 +79,8 @@ void RowSystem::factor(const GameRows& rows, bool closing) {
   const std::span<const GameGroup> groups = rows.groups();
   for (std::size_t g = 0; g < groups.size(); ++g) {
     double* to = factor_.diagonal(g);
-    for (const GameSide& side : groups[g].sides)
-      if (side.frame >= 0) add_products(rows, g, g, side, side, to);
+    const RowsOfGroup of{&groups[g], met(g).data(), met(g).size()};
+    multiply_pair(rows.numbers(), of, of, to);
     const std::span<const std::int32_t> met = this->met(g);
     for (std::size_t i = 0; i < met.size(); ++i) {
       double& own = to[i * met.size() + i];
@@ -116,23 +91,10 @@ void RowSystem::factor(const GameRows& rows, bool closing) {
   for (std::size_t c = 0; c < graph_.size(); ++c) {
     const std::int32_t of_rows = factor_.rows_of(c), of_columns = graph_[c][0] == of_rows ? graph_[c][1] : graph_[c][0];
     const auto r = static_cast<std::size_t>(of_rows), s = static_cast<std::size_t>(of_columns);
-    for (const GameSide& a : groups[r].sides)
-      for (const GameSide& b : groups[s].sides)
-        if (a.frame >= 0 && a.frame == b.frame) add_products(rows, r, s, a, b, factor_.block(c));
+    multiply_pair(rows.numbers(), {&groups[r], met(r).data(), met(r).size()},
+                  {&groups[s], met(s).data(), met(s).size()}, factor_.block(c));
   }
   factor_.factor();
-}
-
-void RowSystem::add_products(const GameRows& rows, std::size_t of_rows, std::size_t of_columns, const GameSide& a,
-                             const GameSide& b, double* to) const {
-  const std::span<const std::int32_t> r = met(of_rows), c = met(of_columns);
-  const auto is_ball = [&](std::size_t group) { return sizes_[group] == 3 && rows.groups()[group].count == 3; };
-  if (is_ball(of_rows) && is_ball(of_columns))
-    return (of_rows == of_columns ? add_ball_products<true> : add_ball_products<false>)(rows.numbers(a, 0),
-                                                                                        rows.numbers(b, 0),
-                                                                                        a.coordinates, to);
-  for (const std::int32_t i : r)
-    for (const std::int32_t j : c) *to++ += dot(rows.numbers(a, i), rows.numbers(b, j), a.coordinates);
 }
 
 // Conjugate gradients -------------------------------------------------------------------------------------------------
@@ -166,8 +128,9 @@ void RowSystem::solve_fully(const GameRows& rows, std::span<const double> guess,
 
 /// (J Jᵀ + C) x
 void RowSystem::multiply(const GameRows& rows, std::span<const double> x, std::span<double> product) {
-  std::vector<double>&moved = gradients_.moved, &forces = gradients_.forces;
-  moved.assign(rows.coordinates(), 0.0);
+  std::vector<Double8>& moved = gradients_.moved;
+  std::vector<double>& forces = gradients_.forces;
+  moved.assign(rows.blocks(), {});
   forces.assign(rows.rows().size(), 0.0);
   for_met(rows, [&](std::size_t row, std::size_t k) { forces[row] = x[k]; });
   rows.add_transposed(forces, moved);

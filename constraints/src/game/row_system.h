@@ -6,6 +6,8 @@
 // by it.
 #pragma once
 
+#include <array>
+
 #include "game_rows.h"
 #include "joint_factor.h"
 #include "limber/core/disjoint_sets.h"
@@ -53,8 +55,6 @@ class RowSystem {
  private:
   void number_components(const GameBodies& bodies, std::span<const GameGroup> groups);
   void list_met(const GameRows& rows, bool closing);
-  void add_products(const GameRows& rows, std::size_t of_rows, std::size_t of_columns, const GameSide& a,
-                    const GameSide& b, double* to) const;
   void multiply(const GameRows& rows, std::span<const double> x, std::span<double> product);
 
   JointFactor factor_;
@@ -68,7 +68,8 @@ class RowSystem {
   std::vector<std::int32_t> first_met_, sizes_;  // by group: in met_
   bool all_met_ = false;                         // of the graph at hand
   struct Gradients {
-    std::vector<double> residual, direction, product, conditioned, moved, forces;
+    std::vector<double> residual, direction, product, conditioned, forces;
+    std::vector<Double8> moved;
   } gradients_;
 };
 
