@@ -9,13 +9,6 @@ namespace limber {
 
 using internal::frame_at;
 
-const RigidTransform& BodyStates::pose(Index body, StepTime when) const {
-  static const RigidTransform kWorld{};
-  if (body < 0) return kWorld;
-  const ConstrainedBody& b = this->body(body);
-  return b.group == nullptr ? b.pose : frame_at(*b.group, b.slot, when).pose();
-}
-
 Vec3 BodyStates::origin(Index body, StepTime when) const {
   if (when != StepTime::kMiddle) return pose(body, when).p;
   return 0.5 * (pose(body, StepTime::kStart).p + pose(body, StepTime::kEnd).p);

@@ -14,7 +14,11 @@ void ConstraintRows::clear() {
 
 /// Rows are written where they stay: a copy of what was written a moment ago would wait for it.
 Index ConstraintRows::add(const RowSide& a, const RowSide& b, const RowParameters& law) {
-  row(add(a, b)).law = law;
+  Row& row = add();
+  row.law = law;
+  write(a, row.sides[0]);
+  write(b, row.sides[1]);
+  join(row);
   return size() - 1;
 }
 

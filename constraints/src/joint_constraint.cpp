@@ -113,6 +113,7 @@ void JointConstraint::plan_actuation() {
       rows_.push_back(row_of(i, Law::kDrive, 1.0, act.drive_target));
     if (act.friction > 0.0) rows_.push_back(row_of(i, Law::kFriction));
   }
+  sees_turns_ = std::ranges::any_of(rows_, [](const RowPlan& row) { return row.measure != Measure::kTranslation; });
   counts_turns_ = std::ranges::any_of(
       rows_, [](const RowPlan& row) { return row.measure == Measure::kAngle || row.measure == Measure::kScrew; });
 }
@@ -136,8 +137,7 @@ JointConstraint::Instant JointConstraint::instant(const BodyStates& states, Step
 
 /// With what rows look at: of b those of distances along a's axes see its origin alone.
 JointConstraint::Instant JointConstraint::instant_of_rows(const BodyStates& states, StepTime when) const {
-  const bool axes = std::ranges::any_of(rows_, [](const RowPlan& r) { return r.measure != Measure::kTranslation; });
-  return {.a = a_.at(states, when), .b = b_.at(states, when, axes)};
+  return {.a = a_.at(states, when), .b = b_.at(states, when, sees_turns_)};
 }
 
 /// Of its coordinates, angles within half a turn.
@@ -278,22 +278,26 @@ void JointConstraint::write_actuation_law(const RowPlan& plan, double gap, RowPa
 }
 
 /// All act at b's frame on both parts, opposite.
-Index JointConstraint::add_row(const Instant& at, const RowPlan& plan, const Direction& along, ConstraintRows& rows) {
-  const Vec3 &p = at.b.position, &n = along.linear;
-  const Vec3 between = p - at.a.position, arm_a = at.a.position - at.a.origin, arm_b = p - at.b.origin;
-  RowSide a{.body = a_.body()}, b{.body = b_.body()};
+RowParameters& JointConstraint::add_row(const Instant& at, const Arms& arms, const RowPlan& plan,
+                                        const Direction& along, ConstraintRows& rows) {
+  const Vec3& n = along.linear;
+  ConstraintRows::Row& row = rows.add();
+  auto& [b, a] = row.sides;
+  a.body = a_.body(), b.body = b_.body();
   for (int k = 0; k < 3; ++k) {
     a.linear[k] = -n[k], b.linear[k] = n[k];
-    a.angular[k] = cross_component(n, between, k) + cross_component(n, arm_a, k) - along.angular[k];
-    b.angular[k] = cross_component(arm_b, n, k) + along.angular[k];
+    a.angular[k] = cross_component(n, arms.a, k) - along.angular[k];
+    b.angular[k] = cross_component(arms.b, n, k) + along.angular[k];
   }
+  a.modal_count = b.modal_count = 0;
   if (at.a.bend || at.b.bend) {
     FrameMeasure of_a, of_b;
     bend(at, plan, along, of_a, of_b);
-    if (at.a.bend) a_.write_modal(at.a, of_a, modal_a_), a.modal = modal_a_;
-    if (at.b.bend) b_.write_modal(at.b, of_b, modal_b_), b.modal = modal_b_;
+    if (at.b.bend) b_.write_modal(at.b, of_b, modal_), rows.set_modal(b, modal_);
+    if (at.a.bend) a_.write_modal(at.a, of_a, modal_), rows.set_modal(a, modal_);
   }
-  return rows.add(b, a);
+  rows.join(row);
+  return row.law;
 }
 
 /// What modes add. Rows of axes and distances are exact for any step, in its middle too.
@@ -325,14 +329,17 @@ void JointConstraint::add_rows(const BodyStates& states, StepTime when, double s
   if (when == StepTime::kMiddle) return add_mean_rows(states, rows);
   Instant at = instant_of_rows(states, when);
   at.a.find_turning(), at.b.find_turning();
-  if (when == StepTime::kStart) step_ = step, axes_at_start_ = at.a.axes;
-  const auto arm = [&](const FrameInstant& part) { return part.body < 0 ? 0.0 : (at.b.position - part.origin).norm(); };
-  const double length = std::max(arm(at.a), arm(at.b)), from_origin = at.b.position.norm(),
+  if (when == StepTime::kStart) step_ = step;
+  if (when == StepTime::kStart && ends_step_) axes_at_start_ = at.a.axes;
+  const Arms arms(at);
+  const double square_a = at.a.body < 0 ? 0.0 : arms.a.squaredNorm(),
+               square_b = at.b.body < 0 ? 0.0 : arms.b.squaredNorm(), length = std::sqrt(std::max(square_a, square_b)),
+               from_origin = at.b.position.norm(),
                nearest = internal::kConstraintsTuning.rows.joint_tolerance * length + digits_of(from_origin),
                place_digits = digits_of(length + from_origin);
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const RowPlan& plan = rows_[i];
-    RowParameters& law = rows.row(add_row(at, plan, direction(at, plan), rows)).law;
+    RowParameters& law = add_row(at, arms, plan, direction(at, plan), rows);
     const bool distance = is_distance(plan);
     const double gap = this->gap(at, plan);
     write_law(plan, gap, law);
@@ -347,7 +354,8 @@ void JointConstraint::add_mean_rows(const BodyStates& states, ConstraintRows& ro
   const Instant start = instant(states, StepTime::kStart), end = instant(states, StepTime::kEnd),
                 at{.a = a_.between(start.a, end.a), .b = b_.between(start.b, end.b)};
   const Vec3 turn = a_.turn(states);
-  for (const RowPlan& plan : rows_) add_row(at, plan, mean_direction(start, end, at, plan, turn), rows);
+  const Arms arms(at);
+  for (const RowPlan& plan : rows_) add_row(at, arms, plan, mean_direction(start, end, at, plan, turn), rows);
 }
 
 void JointConstraint::add_force_derivative(const BodyStates& states, std::span<const double> impulses,
@@ -408,24 +416,28 @@ void JointConstraint::gaps(const BodyStates& states, StepTime when, std::span<do
 }
 
 void JointConstraint::accept(const BodyStates& states, std::span<const double> impulses) {
-  force_.coordinate = {}, force_.actuation = {};
-  force_.plan.resize(plan_.size());
   const double by = 1.0 / step_;
-  double locked[3] = {};
-  for (std::size_t i = 0; i < impulses.size(); ++i) {
-    const RowPlan& plan = rows_[i];
-    const double force = by * impulses[i];
-    (plan.law < Law::kMotor ? force_.plan[i] : force_.actuation[actuator(plan)]) = force;
-    if (plan.coordinate >= 0)
-      force_.coordinate[static_cast<std::size_t>(plan.coordinate)] += plan.sign * force;
-    else if (plan.measure == Measure::kTranslation)
-      for (int k = 0; k < 3; ++k) locked[k] += force * axes_at_start_(k, plan.axis);
-  }
-  force_.locked = {locked[0], locked[1], locked[2]};
+  force_.actuation = {};
+  force_.plan.resize(plan_.size());
+  for (std::size_t i = 0; i < impulses.size(); ++i) last_force(i) = by * impulses[i];
+  if (ends_step_) sum_forces();
   if (!ends_step_ && !counts_turns_) return;
   const Instant at = instant(states, StepTime::kStart);  // the state has been taken: the step's end
   const Vec3 raw = raw_coordinates(at);
   for (int i = 0; i < coordinates(); ++i) last_[static_cast<std::size_t>(i)] = unwrapped(raw[i], i);
+}
+
+/// What is told of a step.
+void JointConstraint::sum_forces() {
+  force_.coordinate = {}, force_.locked.setZero();
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const RowPlan& plan = rows_[i];
+    const double force = last_force(i);
+    if (plan.coordinate >= 0)
+      force_.coordinate[static_cast<std::size_t>(plan.coordinate)] += plan.sign * force;
+    else if (plan.measure == Measure::kTranslation)
+      force_.locked += force * axes_at_start_.col(plan.axis);
+  }
 }
 
 JointConstraint::Error JointConstraint::error(const BodyStates& states) const {

@@ -123,6 +123,7 @@ void GameBodies::place_frame(std::size_t at, const RigidFrame& frame) {
     if (frame.settings().locks.translation[i]) body.goes[static_cast<Eigen::Index>(i)] = 0.0;
   if (c.motion == FrameMotion::kFree) {
     body.root_mass = std::sqrt(c.mass);
+    body.shift = plan_.length() / body.root_mass * body.goes;
     of.root_mass.v[lane] = body.root_mass, of.per_root.v[lane] = 1.0 / body.root_mass;
     tell_loads(at);
   }
@@ -203,7 +204,7 @@ void GameBodies::turn_axes() {
 void GameBodies::write_frame_row(const GameBody& body, const Vec3& linear, const Vec3& moment, Block8& row) const {
   const double h = plan_.length();
   row = {};
-  if (body.root_mass > 0.0) write_vector(h / body.root_mass * linear.cwiseProduct(body.goes), row.v);
+  write_vector(linear.cwiseProduct(body.shift), row.v);
   write_vector(h * (body.turn_scale * moment), row.v + 3);
 }
 

@@ -46,6 +46,7 @@ struct GameBody {
   bool turns_locked = false;            // about any axis of the world
   double root_mass = 0.0;               // √m; 0: its origin is carried
   Vec3 goes = Vec3::Ones();             // along each axis of the world: 0 where its origin is locked, 1 else
+  Vec3 shift = Vec3::Zero();            // likewise: h/√m, 0 where its origin is locked or carried
   Mat3 turn_scale = Mat3::Zero();       // coordinates of the turn = turn_scale L, ω = turn_scaleᵀ coordinates
   Vec3 roots = Vec3::Zero();            // of the inertia about the axes of the turn's coordinates
   struct Start {

@@ -79,8 +79,8 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
     const GameSide& side = group.sides[s];
     if (side.frame < 0) continue;
     const GameBody& body = bodies.body(side.frame);
-    const Vec3 shift = body.root_mass > 0.0 ? Vec3(length_ / body.root_mass * body.goes) : Vec3(Vec3::Zero());
-    const Mat3 turn = length_ * body.turn_scale;
+    const Vec3& shift = body.shift;
+    const Mat3& turn = body.turn_scale;
     Double8* row_of_body = &numbers_[static_cast<std::size_t>(side.at)];
     Pull pull;
     for (std::size_t i = 0; i < group.count; ++i, row_of_body += side.blocks) {
@@ -139,7 +139,7 @@ void GameRows::scale_turns() {
     for (const GameSide& side : group.sides) {
       if (side.frame < 0) continue;
       const Turns& scale = scales_[static_cast<std::size_t>(side.frame)];
-      const double by[3] = {1.0 / scale[0], 1.0 / scale[1], 1.0 / scale[2]};
+      const double by[3] = {length_ / scale[0], length_ / scale[1], length_ / scale[2]};
       Double8* row = &numbers_[static_cast<std::size_t>(side.at)];
       for (std::size_t i = 0; i < group.count; ++i, row += side.blocks)
         for (std::size_t k = 0; k < 3; ++k) row->v[3 + k] *= by[k];
@@ -214,8 +214,7 @@ void GameRows::add_energy_slopes(const GameBodies& bodies, std::span<const RowBo
   for (const RowBody& body : at) {
     slope_.resize(static_cast<std::size_t>(8 * body.blocks));
     bodies.write_energy_slopes(body.frame, y, slope_.data());
-    for (std::size_t l = 0; l < 6 && !more.empty(); ++l)
-      slope_[l] += more[static_cast<std::size_t>(body.first)].v[l];
+    for (std::size_t l = 0; l < 6 && !more.empty(); ++l) slope_[l] += more[static_cast<std::size_t>(body.first)].v[l];
     unscale(body, slope_.data());
     double* to = slopes[static_cast<std::size_t>(body.first)].v;
     for (std::size_t l = 0; l < slope_.size(); ++l) to[l] += slope_[l];

@@ -19,9 +19,15 @@ class BodyStates {
  public:
   explicit BodyStates(std::span<const ConstrainedBody> table) : table_(table) {}
 
-  const RigidTransform& pose(Index body, StepTime when) const;  ///< at one of the step's ends
-  Vec3 origin(Index body, StepTime when) const;                 ///< world, m
-  Mat3 rotation(Index body, StepTime when) const;               ///< R_WB, or R' in the middle
+  /// At one of the step's ends.
+  const RigidTransform& pose(Index body, StepTime when) const {
+    if (body < 0) return kWorld;
+    const ConstrainedBody& b = this->body(body);
+    if (b.group == nullptr) return b.pose;
+    return when == StepTime::kStart ? b.group->frame(b.slot).pose() : b.group->predicted_frame(b.slot).pose();
+  }
+  Vec3 origin(Index body, StepTime when) const;    ///< world, m
+  Mat3 rotation(Index body, StepTime when) const;  ///< R_WB, or R' in the middle
   /// The Cayley vector τ of the body's turn over the step, rad where it is small: R₁ = cay(τ) R₀, |τ| = 2 tan(angle/2).
   Vec3 turn(Index body) const;
   std::span<const double> amplitudes(Index body, StepTime when) const;  ///< at one of the step's ends
@@ -40,6 +46,8 @@ class BodyStates {
   const ConstrainedBody& body(Index body) const { return table_[static_cast<std::size_t>(body)]; }
 
  private:
+  inline static const RigidTransform kWorld{};
+
   std::span<const ConstrainedBody> table_;
 };
 

@@ -116,16 +116,21 @@ class ConstraintRows {
   std::uint64_t makings() const { return makings_; }
   /// @return the row's index. Copies the modal parts. Two sides of one body become one, their sum.
   Index add(const RowSide& a, const RowSide& b, const RowParameters& law);
-  /// The same with the law that a row has by itself, for whoever writes it in its place.
-  Index add(const RowSide& a, const RowSide& b) {
+  /// A row with the law that it has by itself, for whoever writes it in its place: both sides, and then join().
+  Row& add() {
     static const RowParameters kLaw;  // copied in a few instructions, as a new one is not
     if (size_ == static_cast<Index>(rows_.size())) rows_.emplace_back();
     Row& row = this->row(size_++);
     row.law = kLaw;
-    write(a, row.sides[0]);
-    write(b, row.sides[1]);
-    if (a.body >= 0 && a.body == b.body) join_sides(row);
-    return size_ - 1;
+    return row;
+  }
+  void set_modal(Side& side, std::span<const double> modal) {
+    side.modal_begin = modal_.size(), side.modal_count = modal.size();
+    if (!modal.empty()) modal_.insert(modal_.end(), modal.begin(), modal.end());
+  }
+  /// Two sides of one body become one, their sum.
+  void join(Row& row) {
+    if (row.sides[0].body >= 0 && row.sides[0].body == row.sides[1].body) join_sides(row);
   }
   /// Pairs (i, j) as (i, j) or (j, i), i = j too; what is given for one pair adds up. For rows with bounds. All values
   /// of a body together are a positive semidefinite matrix, of rows that act on it.
@@ -145,10 +150,10 @@ class ConstraintRows {
  private:
   void write(const RowSide& from, Side& to) {
     if (from.body < 0) return void(to = {});
-    to.body = from.body, to.modal_begin = modal_.size(), to.modal_count = from.modal.size();
+    to.body = from.body;
     for (int k = 0; k < 3; ++k)  // cross_matrix.h says why
       to.linear[k] = from.linear[k], to.angular[k] = from.angular[k];
-    if (!from.modal.empty()) modal_.insert(modal_.end(), from.modal.begin(), from.modal.end());
+    set_modal(to, from.modal);
   }
   void join_sides(Row& row);
 

@@ -74,6 +74,11 @@ class JointConstraint final : public Constraint {
     FrameInstant a, b;
     Vec3 d = a.local(b.position);  // in a's axes
   };
+  /// From the origin of each body to o_b, where all forces act, world.
+  struct Arms {
+    explicit Arms(const Instant& at) : a(at.b.position - at.a.origin), b(at.b.position - at.b.origin) {}
+    Vec3 a, b;
+  };
   /// What a row measures: d_i; one axis of b across one of a; q_i of the vector part of Q's quaternion, twice; the
   /// screw's d_x − pitch q; an angle q; how far x_b is from x_a.
   enum class Measure { kTranslation, kAcross, kTurn, kScrew, kAngle, kCone };
@@ -92,7 +97,7 @@ class JointConstraint final : public Constraint {
     std::array<double, 3> coordinate{};
     std::array<double, 9> actuation{};  // by actuator()
     std::vector<double> plan;           // by row of plan_
-    Vec3 locked = Vec3::Zero();
+    Vec3 locked = Vec3::Zero();         // locked and coordinate: of a step's last part
   };
   /// Relative motion that a row measures: linear along n at o_b, and angular about a; world.
   struct Direction {
@@ -124,13 +129,18 @@ class JointConstraint final : public Constraint {
   static std::size_t actuator(const RowPlan& row) {
     return static_cast<std::size_t>(3 * (static_cast<int>(row.law) - static_cast<int>(Law::kMotor)) + row.coordinate);
   }
+  double& last_force(std::size_t row) {
+    return rows_[row].law < Law::kMotor ? force_.plan[row] : force_.actuation[actuator(rows_[row])];
+  }
+  void sum_forces();
   RowPlan row_of(int coordinate, Law law, double sign = 1.0, double zero = 0.0) const;
   void plan();
   void plan_locked_rows();
   void plan_limits();
   void plan_actuation();
   void add_mean_rows(const BodyStates& states, ConstraintRows& rows);
-  Index add_row(const Instant& at, const RowPlan& plan, const Direction& along, ConstraintRows& rows);
+  RowParameters& add_row(const Instant& at, const Arms& arms, const RowPlan& plan, const Direction& along,
+                         ConstraintRows& rows);
   void bend(const Instant& at, const RowPlan& plan, const Direction& along, FrameMeasure& of_a,
             FrameMeasure& of_b) const;
   void write_law(const RowPlan& plan, double gap, RowParameters& law) const;
@@ -144,9 +154,11 @@ class JointConstraint final : public Constraint {
   std::vector<RowPlan> rows_;     // plan_ and the actuation
   Forces force_;
   double step_ = 0.0;
-  bool ends_step_ = true, counts_turns_ = false;  // the part at hand does; a row measures an angle
+  bool ends_step_ = true;      // the part at hand does
+  bool counts_turns_ = false;  // a row measures an angle
+  bool sees_turns_ = false;    // a row is not of a distance along a's axes
   Mat3 axes_at_start_ = Mat3::Identity();
-  std::vector<double> modal_a_, modal_b_;
+  std::vector<double> modal_;         // scratch
   mutable std::vector<Vec3> shapes_;  // scratch of add_force_derivative()
 };
 
