@@ -87,17 +87,21 @@ HWY_INLINE HWY_ATTR void Product(const Wide* a, const Wide* b, Wide* to) {
   }
 }
 
-/// c₀ + c₁ x + … of the series 1/first! − x/(first + 2)! + …
+/// The series first! (1/first! − x/(first + 2)! + …) to round-off up to 1, in pairs of terms: none waits for all
+/// others.
 HWY_INLINE HWY_ATTR Wide Series(double first, Wide x) {
-  constexpr int kTerms = 8;  // round-off up to 1
+  constexpr std::size_t kPairs = 4;
   const Doubles d;
-  const Wide one = hn::Set(d, 1.0);
-  Wide sum = one;
-  for (int i = kTerms; i > 0; --i) {
-    const double n = 2.0 * i + first;
-    sum = hn::NegMulAdd(hn::Mul(hn::Set(d, 1.0 / (n * (n - 1.0))), x), sum, one);
+  Wide pair[kPairs];
+  double factor = 1.0, n = first;
+  const auto next = [&] { return n += 2.0, factor /= -n * (n - 1.0); };
+  for (std::size_t i = 0; i < kPairs; ++i) {
+    const Wide even = hn::Set(d, i == 0 ? 1.0 : next());
+    pair[i] = hn::MulAdd(hn::Set(d, next()), x, even);
   }
-  return sum;
+  const Wide square = hn::Mul(x, x), fourth = hn::Mul(square, square);
+  const Wide rest = hn::MulAdd(hn::Set(d, next()), fourth, hn::MulAdd(pair[3], square, pair[2]));
+  return hn::MulAdd(rest, fourth, hn::MulAdd(pair[1], square, pair[0]));
 }
 
 /// The same rotations, by 2π at most. Of angles beyond 1e16 nothing is known but round-off, which the bounds keep
@@ -107,8 +111,8 @@ HWY_INLINE HWY_ATTR void TakeOffWholeTurns(Wide* r) {
   const Doubles d;
   Wide square = hn::Mul(r[0], r[0]);
   for (std::size_t i = 1; i < 3; ++i) square = hn::MulAdd(r[i], r[i], square);
-  const Wide angle = hn::Sqrt(square), two_turns = hn::Set(d, 2.0 * kTurn);
-  const Wide rest = hn::NegMulAdd(hn::Round(hn::Div(angle, two_turns)), two_turns, angle);
+  const Wide angle = hn::Sqrt(square), per_two_turns = hn::Set(d, 0.5 / kTurn);
+  const Wide rest = hn::NegMulAdd(hn::Round(hn::Mul(angle, per_two_turns)), hn::Set(d, 2.0 * kTurn), angle);
   const Wide bounded = hn::Max(hn::Set(d, -kTurn), hn::Min(rest, hn::Set(d, kTurn)));
   const Wide part = hn::Div(bounded, hn::Max(angle, hn::Set(d, std::numeric_limits<double>::min())));
   for (std::size_t i = 0; i < 3; ++i) r[i] = hn::Mul(part, r[i]);
@@ -141,15 +145,15 @@ HWY_INLINE HWY_ATTR void Turned(Wide* r, Wide* q) {
 HWY_INLINE HWY_ATTR void Normalise(Wide* q) {
   Wide square = hn::Mul(q[0], q[0]);
   for (std::size_t i = 1; i < 4; ++i) square = hn::MulAdd(q[i], q[i], square);
-  const Wide norm = hn::Sqrt(square);
-  for (std::size_t i = 0; i < 4; ++i) q[i] = hn::Div(q[i], norm);
+  const Wide per = hn::Div(hn::Set(Doubles(), 1.0), hn::Sqrt(square));
+  for (std::size_t i = 0; i < 4; ++i) q[i] = hn::Mul(per, q[i]);
 }
 
 /// About the principal axes.
 HWY_INLINE HWY_ATTR void InverseInertia(const EightFrames& f, std::size_t lane, Wide* inverse) {
   for (std::size_t i = 0; i < 3; ++i) {
-    const Wide root = Get(f.roots[i], lane);
-    inverse[i] = hn::Div(hn::Set(Doubles(), 1.0), hn::Mul(root, root));
+    const Wide per = Get(f.per_turn[i], lane);
+    inverse[i] = hn::Mul(per, per);
   }
 }
 
@@ -167,7 +171,7 @@ HWY_INLINE HWY_ATTR void MiddleMomentum(const Wide* inverse, Wide a, const Wide*
     Wide off[3], row[3][3], cofactor[3][3];
     for (std::size_t i = 0; i < 3; ++i) {
       const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
-      off[i] = hn::Sub(hn::MulAdd(hn::Mul(c[i], m[j]), m[k], m[i]), start[i]);
+      off[i] = hn::MulAdd(hn::Mul(c[i], m[j]), m[k], hn::Sub(m[i], start[i]));
       row[i][i] = one, row[i][j] = hn::Mul(c[i], m[k]), row[i][k] = hn::Mul(c[i], m[j]);
     }
     for (std::size_t i = 0; i < 3; ++i)
@@ -224,7 +228,8 @@ HWY_INLINE HWY_ATTR void LoseEnergy(const Wide* inverse, const Wide* m, Wide twi
   AddCross(none, sine, u, slope, by + 1);
 }
 
-/// About a momentum, by what Cayley's map is short of the angle x: that by which a body turns about it in the mean.
+/// Makes them unit quaternions: about a momentum, by what Cayley's map is short of the angle x: that by which a body
+/// turns about it in the mean.
 /// @param action x |L|
 HWY_INLINE HWY_ATTR void TurnAbout(const Wide* momentum, Wide action, Wide* q) {
   const Doubles d;
@@ -240,7 +245,8 @@ HWY_INLINE HWY_ATTR void TurnAbout(const Wide* momentum, Wide action, Wide* q) {
   for (std::size_t i = 0; i < 4; ++i) q[i] = to[i];
 }
 
-/// Attitudes after a free turn. @param q before and after. @param momentum world
+/// Attitudes after a free turn; between, quaternions are of any length. @param q before and after. @param momentum
+/// world
 HWY_INLINE HWY_ATTR void TurnFreely(const EightFrames& f, const Wide* momentum, Wide time, std::size_t lane, Wide* q) {
   const Doubles d;
   Wide R[3][3], body[3], start[3], m[3], inverse[3], spin[3], by[4], to[4], end[3];
@@ -250,12 +256,12 @@ HWY_INLINE HWY_ATTR void TurnFreely(const EightFrames& f, const Wide* momentum, 
   InverseInertia(f, lane, inverse);
   Wide twice = hn::Zero(d);
   for (std::size_t i = 0; i < 3; ++i) twice = hn::MulAdd(hn::Mul(inverse[i], start[i]), start[i], twice);
-  MiddleMomentum(inverse, hn::Mul(hn::Set(d, 0.5), time), start, m);
-  for (std::size_t i = 0; i < 3; ++i) spin[i] = hn::Mul(inverse[i], m[i]);
+  const Wide half = hn::Mul(hn::Set(d, 0.5), time);
+  MiddleMomentum(inverse, half, start, m);
+  for (std::size_t i = 0; i < 3; ++i) spin[i] = hn::Mul(half, hn::Mul(inverse[i], m[i]));
   Multiply(f.principal, false, spin, lane, by + 1);
-  by[0] = hn::Div(hn::Set(d, 2.0), time);  // a quaternion of any length
+  by[0] = hn::Set(d, 1.0);
   Product(q, by, to);
-  Normalise(to);
   TurnAbout(momentum, hn::Mul(time, twice), to);
   Rotation(to, R);
   Turn(R, true, momentum, body);
@@ -284,13 +290,13 @@ HWY_INLINE HWY_ATTR void TurnLanes(EightFrames& f, double time, std::size_t lane
   if (time > 0.0) TurnFreely(f, momentum, hn::Set(d, 0.5 * time), lane, q);
   Rotation(q, R);
   for (std::size_t i = 0; i < 3; ++i) {
-    const Wide root = Get(f.roots[i], lane);
+    const Wide root = Get(f.roots[i], lane), per = Get(f.per_turn[i], lane);
     Wide turn = hn::Zero(d), gain = hn::Zero(d);
     for (std::size_t j = 0; j < 3; ++j) {
       const Wide axis =
           hn::MulAdd(R[j][0], Get(f.principal[0][i], lane),
                      hn::MulAdd(R[j][1], Get(f.principal[1][i], lane), hn::Mul(R[j][2], Get(f.principal[2][i], lane))));
-      const Wide scale = hn::Div(axis, root);
+      const Wide scale = hn::Mul(per, axis);
       turn = hn::MulAdd(scale, momentum[j], turn), gain = hn::MulAdd(scale, torque[j], gain);
       Put(hn::IfThenElse(turns, scale, Get(f.turn_scale[i][j], lane)), f.turn_scale[i][j], lane);
       Put(hn::IfThenElse(turns, hn::Mul(axis, root), Get(f.momentum[i][j], lane)), f.momentum[i][j], lane);

@@ -27,7 +27,8 @@ struct EightFrames {
   Double8 turns_axes = kOnes;                // 1: turn_frames() is for it; 0: else
   Double8 principal[3][3];                   // its principal axes in the body, as columns
   Double8 roots[3] = {kOnes, kOnes, kOnes};  // of the moments of inertia about them
-  Double8 root_mass, per_root = kOnes;       // √m, 1/√m; 0: led
+  Double8 per_turn[3] = {kOnes, kOnes, kOnes};  // 1/roots; 0: it does not turn about that axis
+  Double8 root_mass, per_root = kOnes;          // √m, 1/√m; 0: led
   /// With a substep's loads and damping v becomes left v + gain, and so do the turn's coordinates.
   struct Loads {
     Double8 left, gain[3], turn_left, turn_gain[3];

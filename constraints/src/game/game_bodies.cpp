@@ -132,6 +132,7 @@ void GameBodies::place_frame(std::size_t at, const RigidFrame& frame) {
   const Mat3 axes = to_matrix(c.principal.q_BP);
   put(axes, of.principal, lane);
   put(body.roots, of.roots, lane);
+  put(Vec3(body.roots.unaryExpr([](double root) { return root > 0.0 ? 1.0 / root : 0.0; })), of.per_turn, lane);
   if (c.motion != FrameMotion::kLine && !body.turns_locked) {
     of.turns_axes.v[lane] = 1.0;
     put(Mat3::Identity(), of.momentum, lane);
@@ -365,7 +366,7 @@ void GameBodies::end_beside_frame(std::size_t at) {
   if (body.led >= 0)
     turn_led(at, quaternion_in(frames_[at / kFramesAtOnce].now.turned, at % kFramesAtOnce));
   else if (plan_.seen)
-    body.group->frame_in_parts(body.slot).set_pose(pose_of(at));
+    body.group->frame_in_parts(body.slot).place(pose_of(at));
 }
 
 void GameBodies::move_modes(GameBody& body) {
@@ -429,7 +430,7 @@ void GameBodies::write_motion(std::int32_t number, double* to) const {
 void GameBodies::tell(std::int32_t number) {
   const auto at = static_cast<std::size_t>(number);
   if (bodies_[at].led >= 0) return tell_led(at);
-  bodies_[at].group->frame_in_parts(bodies_[at].slot).set_pose(pose_of(at));
+  bodies_[at].group->frame_in_parts(bodies_[at].slot).place(pose_of(at));
 }
 
 /// All of its motion, to its group.

@@ -168,6 +168,10 @@ class RigidFrame {
   /// kg·m²/s
   void set_motion(const RigidTransform& X_WB, const Vec3& velocity, const Vec3& angular_momentum);
 
+  /// Where a free body is part way through a step; set_motion() tells how the step ends. @param X_WB its quaternion is
+  /// of length 1
+  void place(const RigidTransform& X_WB) { pose_ = X_WB; }
+
   /// Sets the turning of a body whose origin its parent carries (kPoint, kLine); the parent stays where it is.
   /// @param q_WB kLine: a turn about the line as the parent carries it. @param angular_momentum as above; kLine: its
   /// part along the line counts
