@@ -66,7 +66,7 @@ void GameConstraints::solve(GameBodies& bodies) {
   } else {
     slopes_.clear();
   }
-  rows_.scale(system_.bodies(), bodies.motion(), motion_);
+  rows_.widen(system_.bodies(), bodies.motion(), motion_);
   int round = 0;
   do {
     system_.factor(rows_, false);
@@ -84,7 +84,7 @@ void GameConstraints::solve_once() {
   if (rows_.any_bounded() && std::ranges::any_of(rows, [](const GameRow& r) { return r.hold != Hold::kMet; })) {
     for (std::size_t i = 0; i < rows.size(); ++i)
       if (rows[i].hold != Hold::kMet) forces_[i] = rows[i].force;
-    rows_.add_transposed(forces_, moved_);
+    rows_.add_answer(forces_, moved_);
     rows_.multiply(moved_, forces_);
   }
   rows_.multiply(motion_, products_);
@@ -99,7 +99,7 @@ void GameConstraints::solve_once() {
   system_.for_met(rows_, [&](std::size_t i, std::size_t k) {
     forces_[i] = rows[i].force = rows[i].is_bounded() ? cut_off(rows[i], right_[k]) : right_[k];
   });
-  rows_.add_transposed(forces_, moved_);
+  rows_.add_answer(forces_, moved_);
 }
 
 /// Rows whose forces were cut off stay at that bound, and those at a bound that would go beyond their gaps may take
@@ -125,29 +125,25 @@ bool GameConstraints::let_go(bool takes_hold) {
   return changed;
 }
 
-/// Makes moved_ a motion, and adds it. Twice the energy of what the rows took so, by component.
+/// Adds moved_ to the motion. Twice the energy of what the rows took so, by component.
 void GameConstraints::take(std::vector<Block8>& motion) {
   taken_.assign(system_.components(), 0.0);
   limits_.assign(system_.components(), {});
-  y_.resize(rows_.blocks());
   for (const RowBody& body : system_.bodies()) {
     double& sum = taken_[static_cast<std::size_t>(body.component)];
-    for (std::int32_t b = body.first; b < body.first + body.blocks; ++b) {
-      sum += eight(moved_, b).square().sum();
-      eight(y_, b) = eight(motion, b).cast<double>();
-    }
-    rows_.unscale(body, numbers_of(moved_, body));
+    sum += rows_.stored(body, moved_[static_cast<std::size_t>(body.first)]);
+    for (std::int32_t b = body.first; b < body.first + body.blocks; ++b) sum += eight(moved_, b).square().sum();
   }
   for (std::size_t i = 0; i < forces_.size(); ++i) forces_[i] = rows_.rows()[i].force;
-  limit_change(moved_);
+  limit_change(motion_, moved_);
   for (const RowBody& body : system_.bodies())
     for (std::int32_t b = body.first; b < body.first + body.blocks; ++b)
       eight(motion, b) += eight(moved_, b).cast<float>();
 }
 
-/// Of y_, by forces_: leaves as much of y_ + change as has the energy of limits_ and what the targets' rates give. Rows
-/// that meet them give no more, but for the scales of turns.
-void GameConstraints::limit_change(std::vector<Double8>& change) {
+/// By forces_: leaves as much of y + change as has the energy of limits_ and what the targets' rates give. Rows
+/// that meet them give no more, but for the weights of turns.
+void GameConstraints::limit_change(std::vector<Double8>& y, std::vector<Double8>& change) {
   const std::span<const GameGroup> groups = rows_.groups();
   for (std::size_t g = 0; g < groups.size(); ++g) {
     double given = 0.0;
@@ -158,8 +154,8 @@ void GameConstraints::limit_change(std::vector<Double8>& change) {
   for (const RowBody& body : system_.bodies()) {
     Limit& limit = limits_[static_cast<std::size_t>(body.component)];
     for (std::int32_t b = body.first; b < body.first + body.blocks; ++b) {
-      limit.most += eight(y_, b).square().sum();
-      limit.has += (eight(y_, b) + eight(change, b)).square().sum();
+      limit.most += eight(y, b).square().sum();
+      limit.has += (eight(y, b) + eight(change, b)).square().sum();
     }
   }
   for (Limit& limit : limits_) {
@@ -171,7 +167,7 @@ void GameConstraints::limit_change(std::vector<Double8>& change) {
     const double share = limits_[static_cast<std::size_t>(body.component)].share;
     if (share == 1.0) continue;
     for (std::int32_t b = body.first; b < body.first + body.blocks; ++b)
-      eight(change, b) = share * (eight(y_, b) + eight(change, b)) - eight(y_, b);
+      eight(change, b) = share * (eight(y, b) + eight(change, b)) - eight(y, b);
   }
 }
 
@@ -203,11 +199,11 @@ void GameConstraints::find_gaps(const BodyStates& states) {
 /// What the rows that hold are short of: in their rates, by the way they turned, and in places.
 void GameConstraints::measure(const BodyStates& states, const GameBodies& bodies, bool pushed) {
   const double most = kTuning.recovery_speed * rows_.length();
-  rows_.scale(system_.bodies(), bodies.motion(), motion_);
+  rows_.widen(system_.bodies(), bodies.motion(), motion_);
   rows_.multiply(motion_, products_);
   forces_.assign(rows_.rows().size(), 0.0);
   if (pushed) {
-    rows_.scale_pushes(system_.bodies(), bodies.pushes(), pushes_);
+    rows_.widen_pushes(system_.bodies(), bodies.pushes(), pushes_);
     rows_.multiply(pushes_, forces_);
   }
   find_gaps(states);
@@ -257,8 +253,8 @@ void GameConstraints::displace(GameBodies& bodies) {
       found += kColumns;
     }
   }
-  rows_.add_transposed(forces_, speed_);
-  rows_.add_transposed(products_, place_);
+  rows_.add_answer(forces_, speed_);
+  rows_.add_answer(products_, place_);
   limit_speeds(bodies);
   move(bodies, true);
 }
@@ -266,20 +262,14 @@ void GameConstraints::displace(GameBodies& bodies) {
 /// What the rows took before, they may give.
 void GameConstraints::limit_speeds(const GameBodies& bodies) {
   for (Limit& limit : limits_) limit = {.most = std::max(0.0, limit.most - limit.has)};
-  for (const RowBody& body : system_.bodies()) {
-    bodies.write_motion(body.frame, numbers_of(y_, body));
-    rows_.unscale(body, numbers_of(speed_, body));
-  }
-  limit_change(speed_);
+  for (const RowBody& body : system_.bodies()) bodies.write_motion(body.frame, numbers_of(motion_, body));
+  limit_change(motion_, speed_);
 }
 
 /// By speed_ and place_. @param speeds whether there are any
 void GameConstraints::move(GameBodies& bodies, bool speeds) {
-  for (const RowBody& body : system_.bodies()) {
-    double *speed = numbers_of(speed_, body), *place = numbers_of(place_, body);
-    rows_.unscale(body, place);
-    bodies.displace(body.frame, speed, place);
-  }
+  for (const RowBody& body : system_.bodies())
+    bodies.displace(body.frame, numbers_of(speed_, body), numbers_of(place_, body));
   end_moving(bodies, speeds);
 }
 
@@ -381,7 +371,7 @@ void GameConstraints::close_errors(GameBodies& bodies) {
   place_.assign(rows_.blocks(), {});
   forces_.assign(rows_.rows().size(), 0.0);
   system_.for_met(rows_, [&](std::size_t i, std::size_t k) { forces_[i] = rows_.rows()[i].closing = right_[k]; });
-  rows_.add_transposed(forces_, place_);
+  rows_.add_answer(forces_, place_);
   move(bodies, false);
 }
 

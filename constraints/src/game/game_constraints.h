@@ -50,7 +50,7 @@ class GameConstraints {
   void find_shares();
   void displace(GameBodies& bodies);
   void move(GameBodies& bodies, bool speeds);
-  void limit_change(std::vector<Double8>& change);
+  void limit_change(std::vector<Double8>& y, std::vector<Double8>& change);
   void limit_speeds(const GameBodies& bodies);
   void end_moving(GameBodies& bodies, bool speeds);
   void close_step(const BodyStates& states, GameBodies& bodies);
@@ -61,12 +61,11 @@ class GameConstraints {
 
   GameRows rows_;
   RowSystem system_;
-  std::vector<Double8> motion_, moved_;  // of the bodies, in the rows' coordinates: all of it; what the rows did
+  std::vector<Double8> motion_, moved_;  // of the bodies: all of it; what the rows did
   std::vector<Double8> slopes_;  // of energies, before all impulses of the substep and after them; none: nobody asks
   std::vector<double> taken_, given_;             // energies by component
   std::vector<double> right_, asked_;             // of the system
-  std::vector<Double8> speed_, place_, pushes_;   // in the rows' coordinates
-  std::vector<Double8> y_;                        // a motion, in the bodies' coordinates
+  std::vector<Double8> speed_, place_, pushes_;   // of the bodies
   std::vector<double> gaps_, forces_, products_;  // by row: scratch; products_ keeps J motion_ of a solution
   std::vector<Closing> closings_;                 // by component
   std::vector<Limit> limits_;                     // likewise

@@ -22,7 +22,7 @@ void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::spa
   const SubstepPlan& plan = bodies.plan();
   length_ = plan.length();
   blocks_ = bodies.motion().size();
-  scales_.assign(bodies.bodies().size(), {});
+  stiffness_.assign(bodies.bodies().size(), {});
   led_.clear();
   if (number == 0) rows_.clear(), groups_.clear(), numbers_.clear();
   any_bounded_ = false;
@@ -36,17 +36,17 @@ void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::spa
     for (std::size_t i = 0; i < groups_[g].count; ++i) write_row(bodies, groups_[g], i);
     if (number == 0) hold(groups_[g], plan.step);
   }
-  scale_turns();
+  weigh_turns();
 }
 
 void GameRows::linearise_again(const BodyStates& states, const GameBodies& bodies) {
-  scales_.assign(bodies.bodies().size(), {});
+  stiffness_.assign(bodies.bodies().size(), {});
   led_.clear();
   for (const GameGroup& group : groups_) {
     linearise(states, group.constraint);
     write_sides(bodies, group, true);
   }
-  scale_turns();
+  weigh_turns();
 }
 
 void GameRows::linearise(const BodyStates& states, Constraint* constraint) {
@@ -80,7 +80,7 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
     if (side.frame < 0) continue;
     const GameBody& body = bodies.body(side.frame);
     const Vec3& shift = body.shift;
-    const Mat3& turn = body.turn_scale;
+    const Mat3 turn = length_ * body.turn_scale;
     Double8* row_of_body = &numbers_[static_cast<std::size_t>(side.at)];
     Pull pull;
     for (std::size_t i = 0; i < group.count; ++i, row_of_body += side.blocks) {
@@ -105,8 +105,8 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
     }
     if (!(pull.directions > 1.5)) continue;
     for (int k = 0; k < 3; ++k) pull.arm[k] /= pull.directions - 1.0;
-    closing ? resist(body, pull, scales_[static_cast<std::size_t>(side.frame)])
-            : stiffen(body, pull, scales_[static_cast<std::size_t>(side.frame)]);
+    closing ? resist(body, pull, stiffness_[static_cast<std::size_t>(side.frame)])
+            : stiffen(body, pull, stiffness_[static_cast<std::size_t>(side.frame)]);
   }
 }
 
@@ -132,18 +132,15 @@ void GameRows::resist(const GameBody& body, const Pull& at, Turns& stiffness) {
 }
 
 /// From stiffnesses.
-void GameRows::scale_turns() {
-  for (Turns& scale : scales_)
-    for (double& turn : scale) turn = turn > 0.0 ? std::sqrt(1.0 + 0.25 * length_ * length_ * turn) : 1.0;
-  for (const GameGroup& group : groups_)
-    for (const GameSide& side : group.sides) {
-      if (side.frame < 0) continue;
-      const Turns& scale = scales_[static_cast<std::size_t>(side.frame)];
-      const double by[3] = {length_ / scale[0], length_ / scale[1], length_ / scale[2]};
-      Double8* row = &numbers_[static_cast<std::size_t>(side.at)];
-      for (std::size_t i = 0; i < group.count; ++i, row += side.blocks)
-        for (std::size_t k = 0; k < 3; ++k) row->v[3 + k] *= by[k];
+void GameRows::weigh_turns() {
+  weights_.resize(stiffness_.size());
+  for (std::size_t frame = 0; frame < stiffness_.size(); ++frame) {
+    weights_[frame] = kOnes;
+    for (std::size_t k = 0; k < 3; ++k) {
+      stiffness_[frame][k] *= 0.25 * length_ * length_;
+      weights_[frame].v[3 + k] = 1.0 / (1.0 + stiffness_[frame][k]);
     }
+  }
 }
 
 void GameRows::write_row(const GameBodies& bodies, const GameGroup& group, std::size_t i) {
@@ -199,14 +196,11 @@ void GameRows::add_what_leads(const GameBodies& bodies) {
 
 // Products ------------------------------------------------------------------------------------------------------------
 
-void GameRows::scale(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<Double8>& x) const {
-  x.resize(blocks_);
-  for (const RowBody& body : at) {
-    double* to = x[static_cast<std::size_t>(body.first)].v;
-    for (std::int32_t b = 0; b < body.blocks; ++b)
-      for (int l = 0; l < 8; ++l) to[8 * b + l] = static_cast<double>(y[static_cast<std::size_t>(body.first + b)].v[l]);
-    for (std::size_t k = 0; k < 3; ++k) to[3 + k] *= scales_[static_cast<std::size_t>(body.frame)][k];
-  }
+void GameRows::widen(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<Double8>& to) const {
+  to.resize(blocks_);
+  for (const RowBody& body : at)
+    for (auto b = static_cast<std::size_t>(body.first), end = b + static_cast<std::size_t>(body.blocks); b < end; ++b)
+      for (std::size_t l = 0; l < 8; ++l) to[b].v[l] = static_cast<double>(y[b].v[l]);
 }
 
 void GameRows::add_energy_slopes(const GameBodies& bodies, std::span<const RowBody> at, const std::vector<Block8>& y,
@@ -215,30 +209,28 @@ void GameRows::add_energy_slopes(const GameBodies& bodies, std::span<const RowBo
     slope_.resize(static_cast<std::size_t>(8 * body.blocks));
     bodies.write_energy_slopes(body.frame, y, slope_.data());
     for (std::size_t l = 0; l < 6 && !more.empty(); ++l) slope_[l] += more[static_cast<std::size_t>(body.first)].v[l];
-    unscale(body, slope_.data());
+    for (std::size_t l = 3; l < 6; ++l) slope_[l] *= weights_[static_cast<std::size_t>(body.frame)].v[l];
     double* to = slopes[static_cast<std::size_t>(body.first)].v;
     for (std::size_t l = 0; l < slope_.size(); ++l) to[l] += slope_[l];
   }
 }
 
-void GameRows::scale_pushes(std::span<const RowBody> at, const std::vector<Block8>& pushes,
-                            std::vector<Double8>& x) const {
-  x.assign(blocks_, {});
-  for (const RowBody& body : at) {
-    const auto frame = static_cast<std::size_t>(body.frame);
-    double* to = x[static_cast<std::size_t>(body.first)].v;
+void GameRows::widen_pushes(std::span<const RowBody> at, const std::vector<Block8>& pushes,
+                            std::vector<Double8>& to) const {
+  to.assign(blocks_, {});
+  for (const RowBody& body : at)
     for (std::size_t l = 0; l < 6; ++l)
-      to[l] = static_cast<double>(pushes[frame].v[l]) * (l < 3 ? 1.0 : scales_[frame][l - 3]);
-  }
+      to[static_cast<std::size_t>(body.first)].v[l] =
+          static_cast<double>(pushes[static_cast<std::size_t>(body.frame)].v[l]);
 }
 
-void GameRows::multiply(std::span<const Double8> x, std::vector<double>& product) const {
+void GameRows::multiply(std::span<const Double8> y, std::vector<double>& product) const {
   product.resize(rows_.size());
-  multiply_rows(arrays(), x.data(), product.data());
+  multiply_rows(arrays(), y.data(), product.data());
 }
 
-void GameRows::add_transposed(std::span<const double> forces, std::span<Double8> x) const {
-  add_transposed_rows(arrays(), forces.data(), x.data());
+void GameRows::add_answer(std::span<const double> forces, std::span<Double8> y) const {
+  add_answer_of_rows(arrays(), forces.data(), y.data());
 }
 
 }  // namespace limber::internal

@@ -1,8 +1,9 @@
 // The rows of handles, joints and other Constraints in a substep.
 //
-// J counts in the bodies' coordinates y (game_bodies.h), but for turns of links that are pulled outward: those are
-// x = y √(1 + ¼h²k), k the stiffness against the turn in units of the inertia, so that they come as by the trapezoidal
-// rule. Without that a link that turns to and fro faster than 2 radians a substep would be thrown about.
+// J counts in the bodies' coordinates y (game_bodies.h). Forces move them by W Jᵀf, W = 1 but for turns of links that
+// are pulled outward: there it is 1/(1 + ¼h²k), k the stiffness against the turn in units of the inertia, so that they
+// come as by the trapezoidal rule. Without that a link that turns to and fro faster than 2 radians a substep would be
+// thrown about.
 #pragma once
 
 #include <span>
@@ -58,24 +59,25 @@ class GameRows {
   bool any_bounded() const { return any_bounded_; }  ///< whether any row is
   /// s, the substep
   double length() const { return length_; }
-  const Double8* numbers() const { return numbers_.data(); }  ///< J
+  RowArrays arrays() const { return {groups_.data(), groups_.size(), numbers_.data(), weights_.data()}; }
 
   // Vectors have the blocks of the bodies' coordinates.
-  /// x of y. @param at where, others are left as they are
-  void scale(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<Double8>& x) const;
+  /// y in double. @param at where, others are left as they are
+  void widen(std::span<const RowBody> at, const std::vector<Block8>& y, std::vector<Double8>& to) const;
   /// The same of GameBodies::pushes().
-  void scale_pushes(std::span<const RowBody> at, const std::vector<Block8>& pushes, std::vector<Double8>& x) const;
-  /// slopes += those of the bodies' energies, J for a unit of x. @param y, more whose sum the frames have
+  void widen_pushes(std::span<const RowBody> at, const std::vector<Block8>& pushes, std::vector<Double8>& to) const;
+  /// slopes += W times those of the bodies' energies, J for a unit of y. @param y, more whose sum the frames have
   void add_energy_slopes(const GameBodies& bodies, std::span<const RowBody> at, const std::vector<Block8>& y,
                          std::span<const Double8> more, std::vector<Double8>& slopes);
-  /// y of x in its place, of one body's numbers.
-  void unscale(const RowBody& body, double* y) const {
-    for (std::size_t k = 0; k < 3; ++k) y[3 + k] /= scales_[static_cast<std::size_t>(body.frame)][k];
+  /// Twice the energy that a body's stiffness against turns takes of its motion.
+  double stored(const RowBody& body, const Double8& y) const {
+    const Turns& k = stiffness_[static_cast<std::size_t>(body.frame)];
+    return k[0] * y.v[3] * y.v[3] + k[1] * y.v[4] * y.v[4] + k[2] * y.v[5] * y.v[5];
   }
-  /// J x. @param product one number for each row
-  void multiply(std::span<const Double8> x, std::vector<double>& product) const;
-  /// x += Jᵀ f. @param forces likewise
-  void add_transposed(std::span<const double> forces, std::span<Double8> x) const;
+  /// J y. @param product one number for each row
+  void multiply(std::span<const Double8> y, std::vector<double>& product) const;
+  /// y += W Jᵀ f. @param forces likewise
+  void add_answer(std::span<const double> forces, std::span<Double8> y) const;
 
  private:
   /// A body that something leads, in a row.
@@ -98,13 +100,13 @@ class GameRows {
   static void resist(const GameBody& body, const Pull& at, Turns& stiffness);
   void write_row(const GameBodies& bodies, const GameGroup& group, std::size_t i);
   void hold(const GameGroup& group, double step);
-  void scale_turns();
-  RowArrays arrays() const { return {groups_.data(), groups_.size(), numbers_.data()}; }
+  void weigh_turns();
 
   std::vector<GameRow> rows_;
   std::vector<GameGroup> groups_;
   std::vector<Double8> numbers_;  // J
-  std::vector<Turns> scales_;     // by frame: x/y of its turn
+  std::vector<Turns> stiffness_;  // by frame, against its turn: k, and then ¼h²k
+  std::vector<Double8> weights_;
   std::vector<Led> led_;
   ConstraintRows made_;
   std::vector<double> slope_;  // scratch

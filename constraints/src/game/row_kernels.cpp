@@ -78,35 +78,37 @@ HWY_ATTR void MultiplyRows(const RowArrays& J, const Double8* x, double* product
 
 /// @param next from row to row
 template <std::size_t count>
-HWY_INLINE HWY_ATTR void AddSome(const Double8* row, std::size_t next, const double* forces, Double8& x) {
+HWY_INLINE HWY_ATTR void AddSome(const Double8* row, std::size_t next, const double* forces, const Double8& weight,
+                                 Double8& y) {
   const Doubles d;
   for (std::size_t p = 0; p < kParts; ++p) {
     Wide sum = hn::Mul(hn::Set(d, forces[0]), Get(row[0], p));
     for (std::size_t i = 1; i < count; ++i) sum = hn::MulAdd(hn::Set(d, forces[i]), Get(row[i * next], p), sum);
-    hn::Store(hn::Add(Get(x, p), sum), d, x.v + kDoubles * p);
+    hn::Store(hn::MulAdd(Get(weight, p), sum, Get(y, p)), d, y.v + kDoubles * p);
   }
 }
 
-HWY_ATTR void AddTransposedRows(const RowArrays& J, const double* forces, Double8* x) {
+HWY_ATTR void AddAnswerOfRows(const RowArrays& J, const double* forces, Double8* y) {
   for (const GameGroup* group = J.groups; group != J.groups + J.count; ++group)
     for (const GameSide& side : group->sides) {
       if (side.frame < 0) continue;
       const auto blocks = static_cast<std::size_t>(side.blocks);
       for (std::size_t b = 0; b < blocks; ++b) {
         const Double8* row = J.numbers + side.at + b;
+        const Double8& weight = b == 0 ? J.weights[side.frame] : kOnes;
+        Double8& to = y[side.body + static_cast<std::int32_t>(b)];
         const double* force = forces + group->first;
         std::size_t i = 0;
         for (; i + kTogether <= group->count; i += kTogether, row += kTogether * blocks)
-          AddSome<kTogether>(row, blocks, force + i, x[side.body + static_cast<std::int32_t>(b)]);
-        for (; i < group->count; ++i, row += blocks)
-          AddSome<1>(row, blocks, force + i, x[side.body + static_cast<std::int32_t>(b)]);
+          AddSome<kTogether>(row, blocks, force + i, weight, to);
+        for (; i < group->count; ++i, row += blocks) AddSome<1>(row, blocks, force + i, weight, to);
       }
     }
 }
 
 /// Two sides of rows on one body.
 struct Meeting {
-  const Double8 *a, *b;
+  const Double8 *a, *b, *weight;
   std::size_t blocks;
 };
 
@@ -120,10 +122,11 @@ HWY_INLINE HWY_ATTR void MultiplySquare(const Meeting* begin, const Meeting* end
       for (Wide& x : row) x = hn::Zero(Doubles());
     for (const Meeting* at = begin; at != end; ++at)
       for (std::size_t b = 0; b < at->blocks; ++b) {
+        const Wide weight = Get(b == 0 ? *at->weight : kOnes, p);
         Wide column[kTogether];
         for (std::size_t j = 0; j < kTogether; ++j) column[j] = Get(at->b[columns[j] * at->blocks + b], p);
         for (std::size_t i = 0; i < kTogether; ++i) {
-          const Wide row = Get(at->a[rows[i] * at->blocks + b], p);
+          const Wide row = hn::Mul(weight, Get(at->a[rows[i] * at->blocks + b], p));
           for (std::size_t j = 0; j < (lower ? i + 1 : kTogether); ++j)
             sum[i][j] = hn::MulAdd(row, column[j], sum[i][j]);
         }
@@ -152,13 +155,13 @@ HWY_INLINE HWY_ATTR void MultiplySome(const Meeting* begin, const Meeting* end, 
       to[(i + k) * columns.count + j + l] = Total(sums[k][l]);
 }
 
-HWY_ATTR void MultiplyPair(const Double8* numbers, const RowsOfGroup& rows, const RowsOfGroup& columns, double* to) {
+HWY_ATTR void MultiplyPair(const RowArrays& J, const RowsOfGroup& rows, const RowsOfGroup& columns, double* to) {
   Meeting meetings[4];
   Meeting* end = meetings;
   for (const GameSide& a : rows.group->sides)
     for (const GameSide& b : columns.group->sides)
       if (a.frame >= 0 && a.frame == b.frame)
-        *end++ = {numbers + a.at, numbers + b.at, static_cast<std::size_t>(a.blocks)};
+        *end++ = {J.numbers + a.at, J.numbers + b.at, J.weights + a.frame, static_cast<std::size_t>(a.blocks)};
   const bool lower = rows.group == columns.group;
   for (std::size_t i = 0; i < rows.count; i += kTogether)
     for (std::size_t j = 0; j < (lower ? i + 1 : columns.count); j += kTogether)
@@ -175,19 +178,19 @@ HWY_AFTER_NAMESPACE();
 namespace limber::internal {
 
 HWY_EXPORT(MultiplyRows);
-HWY_EXPORT(AddTransposedRows);
+HWY_EXPORT(AddAnswerOfRows);
 HWY_EXPORT(MultiplyPair);
 
-void multiply_rows(const RowArrays& J, const Double8* x, double* product) {
-  HWY_DYNAMIC_DISPATCH(MultiplyRows)(J, x, product);
+void multiply_rows(const RowArrays& J, const Double8* y, double* product) {
+  HWY_DYNAMIC_DISPATCH(MultiplyRows)(J, y, product);
 }
 
-void add_transposed_rows(const RowArrays& J, const double* forces, Double8* x) {
-  HWY_DYNAMIC_DISPATCH(AddTransposedRows)(J, forces, x);
+void add_answer_of_rows(const RowArrays& J, const double* forces, Double8* y) {
+  HWY_DYNAMIC_DISPATCH(AddAnswerOfRows)(J, forces, y);
 }
 
-void multiply_pair(const Double8* numbers, const RowsOfGroup& rows, const RowsOfGroup& columns, double* to) {
-  HWY_DYNAMIC_DISPATCH(MultiplyPair)(numbers, rows, columns, to);
+void multiply_pair(const RowArrays& J, const RowsOfGroup& rows, const RowsOfGroup& columns, double* to) {
+  HWY_DYNAMIC_DISPATCH(MultiplyPair)(J, rows, columns, to);
 }
 
 }  // namespace limber::internal

@@ -25,11 +25,11 @@ struct GameGroup {
   GameSide sides[2];
 };
 
-/// J.
+/// J, and W of the first block of each frame (game_rows.h).
 struct RowArrays {
   const GameGroup* groups = nullptr;
   std::size_t count = 0;
-  const Double8* numbers = nullptr;
+  const Double8 *numbers = nullptr, *weights = nullptr;
 };
 
 /// Some rows of a group, by number in it.
@@ -39,11 +39,11 @@ struct RowsOfGroup {
   std::size_t count = 0;
 };
 
-/// J x. @param product one number for each row
-void multiply_rows(const RowArrays& J, const Double8* x, double* product);
-/// x += Jᵀ f. @param forces likewise
-void add_transposed_rows(const RowArrays& J, const double* forces, Double8* x);
-/// A part of J Jᵀ, row by row; of rows by themselves its lower part.
-void multiply_pair(const Double8* numbers, const RowsOfGroup& rows, const RowsOfGroup& columns, double* to);
+/// J y. @param product one number for each row
+void multiply_rows(const RowArrays& J, const Double8* y, double* product);
+/// y += W Jᵀ f. @param forces likewise
+void add_answer_of_rows(const RowArrays& J, const double* forces, Double8* y);
+/// A part of J W Jᵀ, row by row; of rows by themselves its lower part.
+void multiply_pair(const RowArrays& J, const RowsOfGroup& rows, const RowsOfGroup& columns, double* to);
 
 }  // namespace limber::internal

@@ -80,7 +80,7 @@ void RowSystem::factor(const GameRows& rows, bool closing) {
   for (std::size_t g = 0; g < groups.size(); ++g) {
     double* to = factor_.diagonal(g);
     const RowsOfGroup of{&groups[g], met(g).data(), met(g).size()};
-    multiply_pair(rows.numbers(), of, of, to);
+    multiply_pair(rows.arrays(), of, of, to);
     const std::span<const std::int32_t> met = this->met(g);
     for (std::size_t i = 0; i < met.size(); ++i) {
       double& own = to[i * met.size() + i];
@@ -91,8 +91,8 @@ void RowSystem::factor(const GameRows& rows, bool closing) {
   for (std::size_t c = 0; c < graph_.size(); ++c) {
     const std::int32_t of_rows = factor_.rows_of(c), of_columns = graph_[c][0] == of_rows ? graph_[c][1] : graph_[c][0];
     const auto r = static_cast<std::size_t>(of_rows), s = static_cast<std::size_t>(of_columns);
-    multiply_pair(rows.numbers(), {&groups[r], met(r).data(), met(r).size()},
-                  {&groups[s], met(s).data(), met(s).size()}, factor_.block(c));
+    multiply_pair(rows.arrays(), {&groups[r], met(r).data(), met(r).size()}, {&groups[s], met(s).data(), met(s).size()},
+                  factor_.block(c));
   }
   factor_.factor();
 }
@@ -126,14 +126,14 @@ void RowSystem::solve_fully(const GameRows& rows, std::span<const double> guess,
   }
 }
 
-/// (J Jᵀ + C) x
+/// (J W Jᵀ + C) x
 void RowSystem::multiply(const GameRows& rows, std::span<const double> x, std::span<double> product) {
   std::vector<Double8>& moved = gradients_.moved;
   std::vector<double>& forces = gradients_.forces;
   moved.assign(rows.blocks(), {});
   forces.assign(rows.rows().size(), 0.0);
   for_met(rows, [&](std::size_t row, std::size_t k) { forces[row] = x[k]; });
-  rows.add_transposed(forces, moved);
+  rows.add_answer(forces, moved);
   rows.multiply(moved, forces);
   for_met(rows, [&](std::size_t row, std::size_t k) { product[k] = rows.rows()[row].compliance * x[k] + forces[row]; });
 }

@@ -1,6 +1,6 @@
 // The linear system of the rows of a substep that hold:
 //
-//   (J Jᵀ + C) Δf = r        J: game_rows.h, C: compliance of springs and dampers
+//   (J W Jᵀ + C) Δf = r      J, W: game_rows.h, C: compliance of springs and dampers
 //
 // by JointFactor, whose nodes are the groups, and where that has left something out by conjugate gradients, conditioned
 // by it.
