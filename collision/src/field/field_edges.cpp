@@ -1,6 +1,7 @@
 #include "field/field_edges.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <tuple>
@@ -45,8 +46,11 @@ void FieldEdges::find(int of, const SampleBounds& ends, std::span<const std::uin
     const auto& between = mine.surface().edge(e).vertices;
     const Vec3f from = view.placed(view.mine->vertex(between[0])), to = view.placed(view.mine->vertex(between[1]));
     const Index near = view.other->shell().triangle_near(hit);
-    if (!goes_through_face(of, e, near, from, to))
-      add_separated_of_face(of, e, walk_to_foot(*view.other, near, from + hit.along * (to - from)).triangle);
+    if (goes_through_face(of, e, near, from, to)) continue;
+    // Of the face next to the point at which the field is least.
+    const Segment edge = segment(of, e);
+    for_edges_of_face(1 - of, walk_to_foot(*view.other, near, from + hit.along * (to - from)).triangle,
+                      [&](const Segment& other) { add_separated(of, edge, other); });
   }
 }
 
@@ -57,6 +61,7 @@ void FieldEdges::find_at_end(int of, const SampleFoot& sample) {
   const FieldView& view = view_[of];
   const CollisionSurface &mine = view.mine->shell().surface(), &other = view.other->shell().surface();
   const Vec3f out = sample.at - sample.foot.point;
+  met_.clear();
   for (const Index t : mine.vertex_triangles(sample.vertex)) {
     const auto corner =
         static_cast<std::size_t>(std::ranges::find(mine.triangle(t), sample.vertex) - mine.triangle(t).begin());
@@ -64,7 +69,12 @@ void FieldEdges::find_at_end(int of, const SampleFoot& sample) {
     const Vec3f to = view.placed(view.mine->vertex(mine.triangle(t)[(corner + 1) % 3]));
     if (!view.mine->shell().sticks_out(e) || out.dot(to - sample.at) >= 0.0f) continue;  // the distance rises
     if (goes_through_face(of, e, sample.foot.triangle, sample.at, to)) continue;
-    for_edges_at(other, sample.foot, [&](Index f) { add_separated(of, e, f); });
+    if (met_.empty())
+      for_edges_at(other, sample.foot, [&](Index f) {
+        if (view.other->shell().sticks_out(f)) met_.push_back(segment(1 - of, f));
+      });
+    const Segment edge = segment(of, e);
+    for (const Segment& met : met_) add_separated(of, edge, met);
   }
 }
 
@@ -81,20 +91,40 @@ Vec3f FieldEdges::vertex(int of, Index v) const {
   return of == 0 ? view_[0].mine->vertex(v) : view_[1].placed(view_[1].mine->vertex(v));
 }
 
+FieldEdges::Segment FieldEdges::segment(int of, Index edge) const {
+  const auto& ends = view_[of].mine->shell().surface().edge(edge).vertices;
+  const Vec3f from = vertex(of, ends[0]);
+  return {edge, from, vertex(of, ends[1]) - from};
+}
+
+// Those that stick out.
+template <class Visit>
+void FieldEdges::for_edges_of_face(int of, Index face, const Visit& visit) const {
+  const Pointshell& shell = view_[of].mine->shell();
+  const Triangle& t = shell.surface().triangle(face);
+  const std::array<Vec3f, 3> x{vertex(of, t[0]), vertex(of, t[1]), vertex(of, t[2])};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Index e = shell.surface().edge_of(face, static_cast<int>(c));
+    if (!shell.sticks_out(e)) continue;
+    const bool forward = shell.surface().edge(e).vertices[0] == t[c];
+    const Vec3f &from = x[forward ? c : (c + 1) % 3], &to = x[forward ? (c + 1) % 3 : c];
+    visit(Segment{e, from, to - from});
+  }
+}
+
 // Where the common perpendicular of two edges meets both between their ends.
-bool FieldEdges::nearest_of_edges(Index e, Index f, EdgePair& pair) const {
-  const auto &ends_e = view_[0].mine->shell().surface().edge(e).vertices,
-             &ends_f = view_[1].mine->shell().surface().edge(f).vertices;
-  const Vec3f a0 = vertex(0, ends_e[0]), b0 = vertex(1, ends_f[0]);
-  const Vec3f u = vertex(0, ends_e[1]) - a0, w = vertex(1, ends_f[1]) - b0, r = b0 - a0;
+bool FieldEdges::nearest_of_edges(const Segment& e, const Segment& f, EdgePair& pair) {
+  const Vec3f &u = e.along, &w = f.along, r = f.from - e.from;
   const Vec3f n = u.cross(w);
   const float n2 = n.squaredNorm();
   // Directions of lines nearer to parallel are noise in single precision.
   const auto parallel = static_cast<float>(collision_tuning().narrow.parallel_touching);
   if (!(n2 > parallel * parallel * u.squaredNorm() * w.squaredNorm())) return false;
-  const float s = r.cross(w).dot(n) / n2, t = r.cross(u).dot(n) / n2;
-  if (!(s > 0.0f && s < 1.0f && t > 0.0f && t < 1.0f)) return false;
-  pair = {e, f, s, t, a0 + s * u, b0 + t * w, n / std::sqrt(n2), 0.0f};
+  const float s = r.cross(w).dot(n) / n2;
+  if (!(s > 0.0f && s < 1.0f)) return false;
+  const float t = r.cross(u).dot(n) / n2;
+  if (!(t > 0.0f && t < 1.0f)) return false;
+  pair = {e.edge, f.edge, s, t, e.from + s * u, f.from + t * w, n / std::sqrt(n2), 0.0f};
   pair.distance = pair.direction.dot(pair.on_e - pair.on_f);
   if (pair.distance < 0.0f) pair.distance = -pair.distance, pair.direction = -pair.direction;
   return true;
@@ -134,14 +164,9 @@ bool FieldEdges::in_normal_cone(int of, Index edge, const Vec3f& direction) cons
   return worst <= kRoundOffOfDirections + rocking * sum.norm() && outward.dot(d) >= -kRoundOffOfDirections;
 }
 
-// Edges that have not crossed, of a face next to the point at which the field is least.
-void FieldEdges::add_separated_of_face(int of, Index edge, Index face) {
-  for (int c = 0; c < 3; ++c) add_separated(of, edge, view_[of].other->shell().surface().edge_of(face, c));
-}
-
-void FieldEdges::add_separated(int of, Index edge, Index other) {
+// Edges that have not crossed.
+void FieldEdges::add_separated(int of, const Segment& edge, const Segment& other) {
   EdgePair pair;
-  if (!view_[of].other->shell().sticks_out(other)) return;
   if (!nearest_of_edges(of == 0 ? edge : other, of == 0 ? other : edge, pair)) return;
   if (touches(pair)) turn(pair, 1.0f);
   const Vec3f motion = expected_motion(pair);
@@ -234,14 +259,13 @@ void FieldEdges::find_crossings(std::size_t first, std::size_t end) {
   for (std::size_t i = first; i < end; ++i) {
     const Piercing& p = piercings_[i];
     const Pointshell& other = view_[p.of].other->shell();
-    for (int c = 0; c < 3; ++c) {
-      const Index edge = other.surface().edge_of(p.face, c);
-      if (other.sticks_out(edge)) cross(p, edge, first, end);
-    }
+    const Segment edge = segment(p.of, p.edge);
+    for_edges_of_face(1 - p.of, p.face, [&](const Segment& of_face) { cross(p.of, edge, of_face, first, end); });
     for (std::size_t j = first; j < end; ++j) {
       const Piercing& back = piercings_[j];
       const bool seen = j > first && piercings_[j - 1].of == back.of && piercings_[j - 1].edge == back.edge;
-      if (back.of != p.of && !seen && is_next_to(other, back.edge, p.face)) cross(p, back.edge, first, end);
+      if (back.of != p.of && !seen && is_next_to(other, back.edge, p.face))
+        cross(p.of, edge, segment(back.of, back.edge), first, end);
     }
   }
 }
@@ -254,12 +278,12 @@ bool FieldEdges::is_next_to(const Pointshell& body, Index edge, Index face) {
 }
 
 // An edge that goes through a facet and one that bounds it, if they have crossed.
-void FieldEdges::cross(const Piercing& p, Index other, std::size_t first, std::size_t end) {
+void FieldEdges::cross(int of, const Segment& edge, const Segment& other, std::size_t first, std::size_t end) {
   EdgePair pair;
-  if (!nearest_of_edges(p.of == 0 ? p.edge : other, p.of == 0 ? other : p.edge, pair)) return;
+  if (!nearest_of_edges(of == 0 ? edge : other, of == 0 ? other : edge, pair)) return;
   if (touches(pair)) turn(pair, -1.0f);
   pair.leads_out = in_normal_cone(1, pair.f, -pair.direction) && in_normal_cone(0, pair.e, pair.direction);
-  if (pair.leads_out || goes_through(other, 1 - p.of, p.edge, first, end)) crossings_.push_back(pair);
+  if (pair.leads_out || goes_through(other.edge, 1 - of, edge.edge, first, end)) crossings_.push_back(pair);
 }
 
 // Whether an edge goes through a facet next to one of the other surface, on a loop.

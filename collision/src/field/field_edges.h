@@ -38,6 +38,11 @@ class FieldEdges {
     float distance;
     bool leads_out = true;  ///< of edges that have crossed: against the direction both surfaces part there
   };
+  /// An edge in the frame of a: its first end, and the way to its second.
+  struct Segment {
+    Index edge;
+    Vec3f from, along;
+  };
   struct WayOut {
     int of;
     Index vertex;
@@ -51,10 +56,12 @@ class FieldEdges {
   Vec3f vertex(int of, Index v) const;
   bool touches(const EdgePair& pair) const;
   void turn(EdgePair& pair, float out_of_b) const;
-  bool nearest_of_edges(Index e, Index f, EdgePair& pair) const;
+  Segment segment(int of, Index edge) const;
+  template <class Visit>
+  void for_edges_of_face(int of, Index face, const Visit& visit) const;
+  static bool nearest_of_edges(const Segment& e, const Segment& f, EdgePair& pair);
   bool in_normal_cone(int of, Index edge, const Vec3f& direction) const;
-  void add_separated(int of, Index edge, Index other);
-  void add_separated_of_face(int of, Index edge, Index face);
+  void add_separated(int of, const Segment& edge, const Segment& other);
   bool goes_through_face(int of, Index edge, Index near, const Vec3f& from, const Vec3f& to);
   Vec3f expected_motion(const EdgePair& pair) const;
   bool comes_near(const EdgePair& pair, const Vec3f& motion) const;
@@ -63,7 +70,7 @@ class FieldEdges {
   void cross_loop(std::size_t first, std::size_t end);
   void find_crossings(std::size_t first, std::size_t end);
   static bool is_next_to(const Pointshell& body, Index edge, Index face);
-  void cross(const Piercing& p, Index other, std::size_t first, std::size_t end);
+  void cross(int of, const Segment& edge, const Segment& other, std::size_t first, std::size_t end);
   bool goes_through(Index edge, int of, Index other, std::size_t first, std::size_t end) const;
   void find_ways_out(std::size_t first, std::size_t end);
   static bool leaves_along(const EdgePair& crossing, const Vec3f& way);
@@ -74,6 +81,7 @@ class FieldEdges {
   FieldView view_[2];
   float reach_ = 0.0f, passed_ = 0.0f;
   std::vector<FieldHit> hits_;
+  std::vector<Segment> met_;  ///< edges at the foot of one sample
   std::vector<Piercing> piercings_;
   std::vector<Crossed> crossed_;
   DisjointSets loops_;
