@@ -124,10 +124,14 @@ bool PatchExits::leaves(const Vec3f& from, const Vec3f& to, FieldHit& exit) cons
   return first_exit(query_, from.data(), to.data(), static_cast<float>(view_.other->shell().cell()), exit);
 }
 
-// How far along a line from a point inside the surface ends, as a part of it.
-float PatchExits::part_inside(const Vec3f& from, const Vec3f& to) const {
+// How far along an edge from a vertex inside it ends, as a part of it. Faces ask for it up to four times.
+// @param edge of the triangle, after the corner of this number
+float PatchExits::part_inside(Index t, std::size_t edge, const Vec3f& from, const Vec3f& to) {
+  const Index e = view_.mine->shell().surface().edge_of(t, static_cast<int>(edge));
+  float& part = part_inside_[static_cast<std::size_t>(e)];
   FieldHit exit;
-  return leaves(from, to, exit) ? exit.along : 1.0f;
+  if (part < 0.0f) part = leaves(from, to, exit) ? exit.along : 1.0f;
+  return part;
 }
 
 // The part of a triangle's area vector that is inside, shared by its corners that are; other's frame.
@@ -140,9 +144,11 @@ Vec3f PatchExits::area_inside(Index t, Index corner) {
   const Vec3f area = 0.5f * (x[1] - x[0]).cross(x[2] - x[0]);
   const bool with_a = sample_of(of[a]) >= 0, with_b = sample_of(of[b]) >= 0;
   if (with_a && with_b) return area / 3.0f;
-  if (!with_a && !with_b) return part_inside(x[v], x[a]) * part_inside(x[v], x[b]) * area;
+  // Edges are named by the corner that they begin at.
+  if (!with_a && !with_b) return part_inside(t, v, x[v], x[a]) * part_inside(t, b, x[v], x[b]) * area;
   const std::size_t in = with_a ? a : b, out = with_a ? b : a;
-  return 0.5f * (1.0f - (1.0f - part_inside(x[v], x[out])) * (1.0f - part_inside(x[in], x[out]))) * area;
+  const float of_v = part_inside(t, with_a ? b : v, x[v], x[out]), of_in = part_inside(t, a, x[in], x[out]);
+  return 0.5f * (1.0f - (1.0f - of_v) * (1.0f - of_in)) * area;
 }
 
 void PatchExits::find(const FieldView& view, std::span<const SampleFoot> samples) {
@@ -151,6 +157,8 @@ void PatchExits::find(const FieldView& view, std::span<const SampleFoot> samples
   const CollisionSurface& surface = view.mine->shell().surface();
   if (sample_of_.size() < static_cast<std::size_t>(surface.vertices()))
     sample_of_.resize(static_cast<std::size_t>(surface.vertices()), -1);
+  if (part_inside_.size() < static_cast<std::size_t>(surface.edges()))
+    part_inside_.resize(static_cast<std::size_t>(surface.edges()), -1.0f);
   // No more samples than vertices: the room of the largest surface once.
   if (patches_.capacity() < sample_of_.size()) patches_.reserve(sample_of_.size()), joined_.reset(sample_of_.size());
   joined_.reset(samples.size());
@@ -169,7 +177,12 @@ void PatchExits::find(const FieldView& view, std::span<const SampleFoot> samples
       patch.way -= area, patch.area += area.norm();
     }
   }
-  for (const SampleFoot& sample : samples) sample_of(sample.vertex) = -1;
+  for (const SampleFoot& sample : samples) {
+    if (!(sample.gap < 0.0f)) continue;
+    sample_of(sample.vertex) = -1;
+    for (const Index t : surface.vertex_triangles(sample.vertex))
+      for (int c = 0; c < 3; ++c) part_inside_[static_cast<std::size_t>(surface.edge_of(t, c))] = -1.0f;
+  }
   const auto least = static_cast<float>(collision_tuning().field.least_patch);
   for (Patch& patch : patches_) {
     const float length = patch.way.norm();

@@ -84,14 +84,16 @@ class PatchExits {
     float area = 0.0f;
   };
   Index& sample_of(Index vertex);
-  float part_inside(const Vec3f& from, const Vec3f& to) const;
   Vec3f area_inside(Index triangle, Index corner);
+  float part_inside(Index triangle, std::size_t edge, const Vec3f& from, const Vec3f& to);
 
   FieldView view_;
   FieldQuery query_{};   ///< of points in the field's frame
   DisjointSets joined_;  ///< samples
   std::vector<Patch> patches_;
   std::vector<Index> sample_of_;  ///< per vertex; −1: not inside. All −1 between calls
+  /// Per edge from an inside vertex, how far along it is inside, as a part of it; −1: not known. All −1 between calls.
+  std::vector<float> part_inside_;
 };
 
 }  // namespace limber::internal
