@@ -270,24 +270,27 @@ void FieldContacts::find_samples(int of, std::span<const std::uint32_t> clusters
 }
 
 void FieldContacts::settle_foot(const FieldView& view, const FieldHit& hit, SampleFoot& sample) {
+  const DeformedPointshell& other = *view.other;
   sample.at = Vec3f(hit.at[0], hit.at[1], hit.at[2]);
-  SurfaceFoothold start = foot_on(*view.other, view.other->shell().triangle_near(hit), sample.at);
+  SurfaceFoothold start = foot_on(other, other.shell().triangle_near(hit), sample.at);
+  const std::array<Index, 8> about = other.shell().triangles_about(hit);
   Index last = start.triangle;
-  for (const Index t : view.other->shell().triangles_about(hit)) {
+  for (const Index t : about) {
     if (t == start.triangle || std::exchange(last, t) == t) continue;
-    const SurfaceFoothold foot = foot_on(*view.other, t, sample.at);
+    const SurfaceFoothold foot = foot_on(other, t, sample.at);
     if (foot.squared_distance < start.squared_distance) start = foot;
   }
-  sample.foot = walk_to_foot(*view.other, start.triangle, sample.at);
-  const Vec3f outward = normal_at(*view.other, sample.foot), out = sample.at - sample.foot.point;
+  sample.foot = walk_to_foot(other, start, sample.at, about);
   // Next to the surface the field's sign is not to be relied on; farther off the foot may be on another part of it.
-  const float near = 0.5f * static_cast<float>(view.other->shell().cell());
-  const bool inside = std::abs(hit.distance) < near ? out.dot(outward) < 0.0f : hit.distance < 0.0f;
+  const bool near = std::abs(hit.distance) < 0.5f * static_cast<float>(other.shell().cell());
   const float distance = std::sqrt(sample.foot.squared_distance);
+  const float directionless = kNoise * static_cast<float>(other.shell().longest_side());
+  const bool directed = sample.foot.corners != kFootOnFace && distance > directionless;
+  const Vec3f out = sample.at - sample.foot.point,
+              outward = near || !directed ? normal_at(other, sample.foot) : Vec3f(Vec3f::Zero());
+  const bool inside = near ? out.dot(outward) < 0.0f : hit.distance < 0.0f;
   sample.gap = inside ? -distance : distance;
-  const float directionless = kNoise * static_cast<float>(view.other->shell().longest_side());
-  const bool on_face = sample.foot.corners == kFootOnFace;
-  sample.normal = !on_face && distance > directionless ? Vec3f(out / sample.gap) : Vec3f(outward.normalized());
+  sample.normal = directed ? Vec3f(out / sample.gap) : Vec3f(outward.normalized());
 }
 
 // Vertices inside whose own surface does not lie on the side that their nearest point would push them to: of two boxes

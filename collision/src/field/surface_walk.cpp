@@ -55,13 +55,14 @@ SurfaceFoothold foot_on(const DeformedPointshell& body, Index t, const Vec3f& p)
   return foot;
 }
 
-SurfaceFoothold walk_to_foot(const DeformedPointshell& body, Index start, const Vec3f& p) {
+SurfaceFoothold walk_to_foot(const DeformedPointshell& body, const SurfaceFoothold& start, const Vec3f& p,
+                             std::span<const Index> seen) {
   const CollisionSurface& surface = body.shell().surface();
-  SurfaceFoothold best = foot_on(body, start, p);
+  SurfaceFoothold best = start;
   for (int step = 0; step < kMostSteps && best.corners != kFootOnFace; ++step) {
     SurfaceFoothold next = best;
     const auto look_at = [&](Index t) {
-      if (t < 0 || t == best.triangle) return;
+      if (t < 0 || t == best.triangle || std::ranges::find(seen, t) != seen.end()) return;
       // Nearer by more than round-off, so that a walk cannot go in circles.
       const SurfaceFoothold foot = foot_on(body, t, p);
       if (foot.squared_distance < next.squared_distance * (1.0f - 1e-6f)) next = foot;

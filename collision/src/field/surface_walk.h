@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <span>
 
 #include "field/pointshell.h"
 #include "narrow/pair_surface.h"
@@ -34,7 +35,12 @@ Vec3f face_normal(const DeformedPointshell& body, Index t);
 SurfaceFoothold foot_on(const DeformedPointshell& body, Index t, const Vec3f& p);
 
 /// A local minimum of the distance from p over the surface: from triangle to triangle as long as one is nearer.
-SurfaceFoothold walk_to_foot(const DeformedPointshell& body, Index start, const Vec3f& p);
+/// @param seen triangles that are no nearer than the start
+SurfaceFoothold walk_to_foot(const DeformedPointshell& body, const SurfaceFoothold& start, const Vec3f& p,
+                             std::span<const Index> seen = {});
+inline SurfaceFoothold walk_to_foot(const DeformedPointshell& body, Index start, const Vec3f& p) {
+  return walk_to_foot(body, foot_on(body, start, p), p);
+}
 
 /// The angle-weighted pseudonormal at a foot: whatever it is the nearest point of lies outside where along it. Not
 /// unit.
