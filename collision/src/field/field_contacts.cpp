@@ -200,8 +200,8 @@ bool FieldContacts::serves(const FieldBody& a, const FieldBody& b) {
   if (!known(a) || !known(b) || (a.shell == nullptr && b.shell == nullptr)) return false;
   const double cells = collision_tuning().field.cells_of_the_other;
   const auto fine = [&](const FieldBody& field, const FieldBody& other) {
-    return field.shell == nullptr || field.shell->shell().distance().kind == DistanceView::Kind::kBox ||
-           is_half_space(other) || field.shell->shell().cell() * cells <= longest_side(other);
+    return field.shell == nullptr || !field.shell->shell().has_grid() || is_half_space(other) ||
+           field.shell->shell().cell() * cells <= longest_side(other);
   };
   return fine(a, b) && fine(b, a);
 }

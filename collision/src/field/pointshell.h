@@ -43,6 +43,8 @@ class Pointshell {
 
   /// Distances of the rest shape. @pre resolved()
   DistanceView distance() const;
+  /// They are looked up in a grid; otherwise they are those of a box.
+  bool has_grid() const { return grid_ != nullptr; }
   double cell() const { return cell_; }  ///< m, of the grid; of a box, of what it is looked at by
   double longest_side() const { return longest_side_; }
   /// A triangle near the foot of a point of the rest shape.
