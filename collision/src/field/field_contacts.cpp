@@ -40,9 +40,10 @@ void set_frame(FieldQuery& query, const Eigen::Matrix3f& R, const Vec3f& p) {
 
 // What turns by θ about a point at a distance r strays by r (1 − cos θ/2) from its chord; points are up to |p| from the
 // origin of the field's frame, and as far as their box's corners from their own. |R' − R| = √8 sin θ/2.
-void set_motion(FieldQuery& query, const RigidTransform& X_FS, const RigidTransform& end,
+// @param R_FS that of X_FS
+void set_motion(FieldQuery& query, const RigidTransform& X_FS, const Mat3& R_FS, const RigidTransform& end,
                 const DeformedPointshell& me) {
-  const Mat3 turn = to_matrix(end.q) - to_matrix(X_FS.q);
+  const Mat3 turn = to_matrix(end.q) - R_FS;
   const Vec3 shift = end.p - X_FS.p;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) query.turn[i][j] = static_cast<float>(turn(i, j));
@@ -79,15 +80,19 @@ SampleBounds bounds_of(const ClusterView& samples, std::vector<float>& room) {
 void FieldView::place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS,
                       const RigidTransform& end, const Vec3& fall, double reach) {
   mine = &me, other = &field;
-  turn = to_matrix(X_FS.q).cast<float>(), shift = X_FS.p.cast<float>();
-  query.field = field.shell().distance();
-  query.lattice = field.lattice();
+  const Mat3 R_FS = to_matrix(X_FS.q);
+  turn = R_FS.cast<float>(), shift = X_FS.p.cast<float>();
   query.reach = static_cast<float>(reach);
-  Eigen::Map<Vec3f>(query.low) = field.low(), Eigen::Map<Vec3f>(query.high) = field.high();
-  set_frame(query, turn, shift);
-  set_motion(query, X_FS, end, me);
+  set_motion(query, X_FS, R_FS, end, me);
   query.swing = me.largest_swing();
   set_fall(query, fall);
+}
+
+void FieldView::see_field() {
+  query.field = other->shell().distance();
+  query.lattice = other->lattice();
+  Eigen::Map<Vec3f>(query.low) = other->low(), Eigen::Map<Vec3f>(query.high) = other->high();
+  set_frame(query, turn, shift);
 }
 
 bool FieldView::apart() const {
@@ -230,6 +235,7 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, motion_.fall,
                  comes_near(0) + slack * a.shell->shell().cell());
   if (view_[1].apart() || part(view_[0], view_[1], static_cast<float>(reach_), motion_.parting)) return;
+  for (FieldView& view : view_) view.see_field();
   edges_.begin(view_[0], view_[1], static_cast<float>(reach_), static_cast<float>(motion_.passed));
   SampleBounds bounds[2];
   for (int of = 0; of < 2; ++of) {
@@ -346,15 +352,16 @@ void FieldContacts::find_on_shape(const FieldBody& body, const FieldBody& shape,
     set_frame(query, Eigen::Matrix3f::Identity(), Vec3f::Zero());
     // In that frame the plane moves the other way.
     const RigidTransform moved = X_BS * (shape_is_a ? motion_.end : motion_.end.inverse());
-    set_motion(query, {}, moved, *body.shell);
+    set_motion(query, {}, Mat3::Identity(), moved, *body.shell);
     set_fall(query, X_BS.q * fall_S);
   } else {
     capsule_of(shape, capsule);
     query.field.kind = DistanceView::Kind::kSegment;
     query.field.size[2] = static_cast<float>(capsule.half_length);
     query.field.radius = static_cast<float>(capsule.radius);
-    set_frame(query, to_matrix(X_SB.q).cast<float>(), X_SB.p.cast<float>());
-    set_motion(query, X_SB, shape_is_a ? motion_.end : motion_.end.inverse(), *body.shell);
+    const Mat3 R_SB = to_matrix(X_SB.q);
+    set_frame(query, R_SB.cast<float>(), X_SB.p.cast<float>());
+    set_motion(query, X_SB, R_SB, shape_is_a ? motion_.end : motion_.end.inverse(), *body.shell);
     set_fall(query, fall_S);
   }
   const ShellView shell = body.shell->view();

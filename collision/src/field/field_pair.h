@@ -22,10 +22,13 @@ struct FieldView {
   Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();  ///< from my frame to the other's
   Vec3f shift = Vec3f::Zero();
 
+  /// All but what the query is asked of: enough for apart() and part().
   /// @param X_FS, end where I am in the field's frame, and am expected to be at the step's end
   /// @param fall one of us may do that beside it, field's frame, m
   void place(const DeformedPointshell& me, const DeformedPointshell& field, const RigidTransform& X_FS,
              const RigidTransform& end, const Vec3& fall, double reach);
+  /// The rest. @pre place()
+  void see_field();
   /// Whether the boxes of both are farther apart than the query's reach along an axis of the field's frame.
   bool apart() const;
   Vec3f placed(const Vec3f& p) const { return turn * p + shift; }
