@@ -96,6 +96,8 @@ class PairBundles {
     std::int32_t frame = -1;  // one of those that move; −1: none
   };
   static constexpr std::size_t kBundlesAtOnce = 4;  // of one thread
+  // Of a level, in one thread. Waking another takes as long as a sweep over so many.
+  static constexpr std::size_t kSweptAtOnce = 32;
   BundleArrays arrays() {
     return {bundles_.data(), packed_.data(), rows_.data(), room_.data(), width_, bundles_.size(), zeros_, standing_};
   }
@@ -191,9 +193,8 @@ void PairBundles::in_order(Jobs& jobs, bool backward, const Kernel& kernel) {
   for (std::size_t i = 0; i + 1 < levels_.size(); ++i) {
     const std::size_t* level = &levels_[backward ? levels_.size() - 2 - i : i];
     const auto part = [&](std::size_t begin, std::size_t end) { kernel(arrays().part(*level + begin, *level + end)); };
-    // Few bundles are not worth a second thread.
     const std::size_t count = level[1] - level[0], share = (count + threads - 1) / threads;
-    jobs.parallel_for(count, std::max(kBundlesAtOnce / 2, share), std::ref(part));
+    jobs.parallel_for(count, std::max(kSweptAtOnce, share), std::ref(part));
   }
 }
 
