@@ -132,12 +132,12 @@ JointConstraint::RowPlan JointConstraint::row_of(int coordinate, Law law, double
 int JointConstraint::axis_of(int coordinate) const { return spec_.type == JointType::kPlanar ? coordinate : 0; }
 
 JointConstraint::Instant JointConstraint::instant(const BodyStates& states, StepTime when) const {
-  return {.a = a_.at(states, when), .b = b_.at(states, when)};
+  return {.a = a_.at_end(states, when), .b = b_.at_end(states, when)};
 }
 
 /// With what rows look at: of b those of distances along a's axes see its origin alone.
 JointConstraint::Instant JointConstraint::instant_of_rows(const BodyStates& states, StepTime when) const {
-  return {.a = a_.at(states, when), .b = b_.at(states, when, sees_turns_)};
+  return {.a = a_.at_end(states, when), .b = b_.at_end(states, when, sees_turns_)};
 }
 
 /// Of its coordinates, angles within half a turn.

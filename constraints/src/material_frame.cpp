@@ -246,7 +246,6 @@ Vec3 MaterialFrame::turn(const BodyStates& states) const {
   return states.turn(body_) + states.rotation(body_, StepTime::kMiddle) * bent;
 }
 
-/// At one of the step's ends.
 FrameInstant MaterialFrame::at_end(const BodyStates& states, StepTime when, bool axes) const {
   const RigidTransform& pose = states.pose(body_, when);
   FrameInstant at{.states = states, .when = when, .body = body_, .origin = pose.p};

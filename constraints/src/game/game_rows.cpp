@@ -20,7 +20,7 @@ double inner(const Vec3& u, const Vec3& v) { return u[0] * v[0] + u[1] * v[1] + 
 void GameRows::make(const BodyStates& states, const GameBodies& bodies, std::span<Constraint* const> constraints,
                     int number) {
   const SubstepPlan& plan = bodies.plan();
-  length_ = plan.length();
+  length_ = plan.length(), per_length_ = 1.0 / length_;
   blocks_ = bodies.motion().size();
   stiffness_.assign(bodies.bodies().size(), {});
   led_.clear();
@@ -104,7 +104,8 @@ void GameRows::write_sides(const GameBodies& bodies, const GameGroup& group, boo
       if (body.led >= 0) led_.push_back({group.first + i, side.frame, from.linear, from.angular});
     }
     if (!(pull.directions > 1.5)) continue;
-    for (int k = 0; k < 3; ++k) pull.arm[k] /= pull.directions - 1.0;
+    const double per = 1.0 / (pull.directions - 1.0);
+    for (int k = 0; k < 3; ++k) pull.arm[k] *= per;
     closing ? resist(body, pull, stiffness_[static_cast<std::size_t>(side.frame)])
             : stiffen(body, pull, stiffness_[static_cast<std::size_t>(side.frame)]);
   }
@@ -145,7 +146,7 @@ void GameRows::weigh_turns() {
 
 void GameRows::write_row(const GameBodies& bodies, const GameGroup& group, std::size_t i) {
   const RowParameters& law = made_.row(static_cast<Index>(i)).law;
-  const double h = length_, per = 1.0 / h;
+  const double h = length_, per = per_length_;
   GameRow& row = rows_[group.first + i];
   row.lower = per * law.lower, row.upper = per * law.upper;
   row.target = row.rate = h * law.end_rate;

@@ -111,7 +111,7 @@ class GameRows {
   ConstraintRows made_;
   std::vector<double> slope_;  // scratch
   std::size_t blocks_ = 0;
-  double length_ = 0.0;
+  double length_ = 0.0, per_length_ = 0.0;
   bool any_bounded_ = false;
 };
 

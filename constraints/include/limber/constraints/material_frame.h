@@ -100,12 +100,13 @@ class MaterialFrame {
   /// The Cayley vector of the body's turn over the step (BodyStates), and to first order that of the deformation.
   Vec3 turn(const BodyStates& states) const;
 
-  /// The frame at one time of a step, with what all rows about it share. @param axes whether its axes count; else they
-  /// are the world's at one of the step's ends
-  FrameInstant at(const BodyStates& states, StepTime when, bool axes = true) const {
+  /// The frame at one time of a step, with what all rows about it share.
+  FrameInstant at(const BodyStates& states, StepTime when) const {
     return when == StepTime::kMiddle ? between(at_end(states, StepTime::kStart), at_end(states, StepTime::kEnd))
-                                     : at_end(states, when, axes);
+                                     : at_end(states, when);
   }
+  /// The same at one of the step's ends. @param axes whether its axes count; else they are the world's
+  FrameInstant at_end(const BodyStates& states, StepTime when, bool axes = true) const;
   /// The middle, from both ends.
   FrameInstant between(const FrameInstant& start, const FrameInstant& end) const;
   /// Of a row that measures the velocity of the frame's origin along n, world. @param modal room for k numbers; the
@@ -134,7 +135,6 @@ class MaterialFrame {
     std::vector<Vec3> shapes{};  // one per mode
   };
 
-  FrameInstant at_end(const BodyStates& states, StepTime when, bool axes = true) const;
   Vec3 turn(std::span<const double> z) const;      // Θ z
   Vec3 displace(std::span<const double> z) const;  // D z
   Vec3 place(const BodyShape& shape) const;
