@@ -48,7 +48,6 @@ export class Scene extends Native {
 
   describe() {
     this.description = JSON.parse(new TextDecoder().decode(this.answer((wasm) => wasm._scene_description(this.pointer), Uint8Array)));
-    for (const model of this.models ?? []) model.dispose();
     this.models = this.description.models.map((_, i) => wrapped(Model, loaded()._scene_model(this.pointer, i), undefined, this));
   }
 
@@ -62,10 +61,11 @@ export class Scene extends Native {
 
   begin(settings = {}) {
     const { gravity, step, substeps, modes, damping, friction, solver, joint_friction, stiffness } = { ...this.description.settings, ...settings };
-    const pointer = call((wasm, numbers, _, made) => wasm._scene_begin(this.pointer, numbers, 10 + stiffness.length, made), [...gravity, step, substeps,
-      modes, damping, friction, SOLVERS.indexOf(solver), joint_friction, ...stiffness.map((factor) => factor ?? Infinity)]);
-    this.world?.dispose();
-    this.world = wrapped(World, pointer, undefined, this);
+    call((wasm, numbers) => wasm._scene_set(this.pointer, numbers, 10 + stiffness.length), [...gravity, step, substeps, modes, damping, friction,
+      SOLVERS.indexOf(solver), joint_friction, ...stiffness.map((factor) => factor ?? Infinity)]);
+    for (const gone of [this.world, ...this.models]) gone?.dispose();
+    this.world = undefined;
+    this.world = wrapped(World, call((wasm, _, __, made) => wasm._scene_begin(this.pointer, made)), undefined, this);
     this.describe();
     [this.bodies, this.statics, this.sensors, this.joints] = [0, 1, 2, 3].map((what) => this.ids(what));
     return this.world;

@@ -13,6 +13,7 @@ struct limber_scene {
   explicit limber_scene(const char* path) : live(path) {}
 
   limber::LiveScene live;
+  limber::LiveSettings settings;        // that it begins with
   std::unique_ptr<limber_world> world;  // is gone before the scene, which finds its contacts
   std::string text;
   std::vector<double> numbers;
@@ -71,14 +72,18 @@ EMSCRIPTEN_KEEPALIVE const limber_model* scene_model(const limber_scene* scene, 
   return limber::c::to_c(*scene->live.models()[model]);
 }
 
-/// The world of before is gone. @param world out: the scene's
-EMSCRIPTEN_KEEPALIVE limber_result scene_begin(limber_scene* scene, const double* numbers, std::size_t count,
-                                               limber_world** world) {
+EMSCRIPTEN_KEEPALIVE limber_result scene_set(limber_scene* scene, const double* numbers, std::size_t count) {
   return guarded([&] {
-    const limber::LiveSettings settings = settings_of(numbers, count);
+    limber::LiveSettings settings = settings_of(numbers, count);
     settings.validate();
+    scene->settings = std::move(settings);
+  });
+}
+/// The world of before is gone, whatever comes of this. @param world out: the scene's
+EMSCRIPTEN_KEEPALIVE limber_result scene_begin(limber_scene* scene, limber_world** world) {
+  return guarded([&] {
     scene->world.reset();
-    scene->live.prepare(settings);
+    scene->live.prepare(scene->settings);
     auto made = std::make_unique<limber_world>(scene->live.world_options(), limber_jobs{});
     scene->live.begin(made->world);
     scene->world = std::move(made);
