@@ -15,7 +15,6 @@ namespace limber {
 using internal::FeatureContact;
 using internal::FeatureSide;
 using internal::KeptPoint;
-using internal::LivePair;
 using internal::ManifoldBody;
 using internal::ManifoldWorker;
 using internal::ManifoldWorkers;
@@ -154,18 +153,21 @@ FeatureContact ManifoldFinder::Impl::feature_contact(const Measured& m, const Ke
 }
 
 /// The contacts that the expected motion may close, with gaps as they are now.
-std::size_t ManifoldFinder::Impl::write(const LivePair& live, const BodyPair& pair, ManifoldWorker& worker,
-                                        ContactPoint* to) const {
-  if (live.points.empty()) return 0;
+std::size_t ManifoldFinder::Impl::write(std::size_t p, ManifoldWorker& worker, ContactPoint* to) const {
+  const std::vector<KeptPoint>& points = graph.at(p).points;
+  if (points.empty()) return 0;
+  const BodyPair& pair = pairs[p];
   const ManifoldBody &a = at(pair.a), &b = at(pair.b);
   const bool by_fields = this->by_fields(pair);
   const PairQuery q =
       by_fields ? query_of(pair) : PairQuery{.a = a, .b = b, .state_a = state(pair.a), .state_b = state(pair.b)};
   const double near_enough = by_fields ? q.expected.near : query.margin + a.reach + b.reach;
   const Vec3 way = a.displacement - b.displacement, between = b.pose.p - a.pose.p, base = a.pose.p - query.origin;
+  const std::span<const Touch> listed = listed_touches(p);
   std::size_t count = 0;
-  for (const KeptPoint& point : live.points) {
-    const Measured m = measure(point, pair, worker);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const KeptPoint& point = points[i];
+    const Measured m = listed.empty() ? measure(point, pair, worker) : listed[i].at;
     const auto closing = [&] {
       return by_fields ? fields.closing(q, feature_contact(m, point, pair)) : -m.normal.dot(way);
     };
@@ -191,8 +193,7 @@ void ManifoldFinder::Impl::write_contacts(std::vector<ContactPoint>& contacts, J
                     [this, &contacts](std::size_t begin, std::size_t end) {
                       const ManifoldWorkers::Lease worker(workers);
                       for (std::size_t p = begin; p < end; ++p)
-                        written.counts[p] =
-                            write(graph.at(p), pairs[p], *worker, contacts.data() + written.first_of[p]);
+                        written.counts[p] = write(p, *worker, contacts.data() + written.first_of[p]);
                     });
   std::size_t count = 0;
   for (std::size_t p = 0; p < pairs.size(); ++p) {
@@ -246,7 +247,7 @@ void ManifoldFinder::exclude_pair(Index a, Index b, bool excluded) { impl_->bodi
 
 void ManifoldFinder::save_state(StateWriter& state) const {
   state(static_cast<std::uint64_t>(impl_->graph.living()));
-  impl_->graph.for_each([&](const BodyPair& pair, const LivePair& live) { state(pair.a, pair.b, live); });
+  impl_->graph.for_each([&](const BodyPair& pair, const internal::LivePair& live) { state(pair.a, pair.b, live); });
   for (const internal::ManifoldBody& body : impl_->bodies.all())
     if (body.modal) state(body.bent), state.numbers(body.amplitudes);
 }

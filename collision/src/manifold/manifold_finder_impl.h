@@ -121,6 +121,7 @@ struct ManifoldFinder::Impl {
   void level_seams();
   void list_touches(std::size_t pair, internal::ManifoldWorker& worker);
   std::span<const Touch> touches_of(std::size_t pair, internal::ManifoldWorker& worker);
+  std::span<const Touch> listed_touches(std::size_t pair) const;
   void list_supports(Index body, internal::ManifoldWorker& worker);
   std::span<const Support> supports_of(Index body, internal::ManifoldWorker& worker);
   bool touches_along(const Vec3& out) const;
@@ -132,8 +133,7 @@ struct ManifoldFinder::Impl {
   double farthest(const internal::PairQuery& query) const;
   double slack(const internal::PairQuery& query) const;
   void write_contacts(std::vector<ContactPoint>& contacts, Jobs& jobs);
-  std::size_t write(const internal::LivePair& live, const BodyPair& pair, internal::ManifoldWorker& worker,
-                    ContactPoint* to) const;
+  std::size_t write(std::size_t pair, internal::ManifoldWorker& worker, ContactPoint* to) const;
 };
 
 }  // namespace limber

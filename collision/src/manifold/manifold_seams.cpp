@@ -47,7 +47,13 @@ void ManifoldFinder::Impl::level_seams() {
 
 std::span<const ManifoldFinder::Impl::Touch> ManifoldFinder::Impl::touches_of(std::size_t p, ManifoldWorker& worker) {
   if (seams.touches_of[p].first == kNotListed) list_touches(p, worker);
+  return listed_touches(p);
+}
+
+/// Of each point of a manifold, or of none.
+std::span<const ManifoldFinder::Impl::Touch> ManifoldFinder::Impl::listed_touches(std::size_t p) const {
   const auto& [first, end] = seams.touches_of[p];
+  if (first == kNotListed) return {};
   return std::span(seams.touches).subspan(first, end - first);
 }
 
