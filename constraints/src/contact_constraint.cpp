@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "contact_history.h"
 #include "limber/core/error.h"
@@ -24,27 +25,27 @@ Mat3 frame_along(const Vec3& n) {
   return axes;
 }
 
-/// Of a side's body, if nothing touches it, along n.
-double acceleration(const BodyStates& states, const PreparedSide& side, const Vec3& n, const Vec3& gravity) {
-  if (states.is_static(side.body)) return 0.0;
-  const auto& [group, slot, pose] = states.body(side.body);
-  const FrameConstants& c = group->frame_constants();
-  if (c.motion != FrameMotion::kFree) return 0.0;
-  return n.dot(group->own_gravity(slot, gravity) + group->held_force(slot) / c.mass);
-}
+/// A body as all contacts with it see it at the step's start.
+struct StartOfBody {
+  RigidTransform pose{};
+  bool is_static = true;
+  Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
+  Vec3 acceleration = Vec3::Zero();  // if nothing touches it
+  BodySurface surface{};             // its velocity in the world's axes
+};
 
-/// How fast a contact's points will come together as they meet; 0: they will not.
-double approach(const BodyStates& states, const PreparedContact& contact, const Vec3& gravity) {
-  const Vec3 n = contact.axes.col(0);
-  double speed = 0.0, gain = 0.0;
-  for (std::size_t s = 0; s < 2; ++s) {
-    const PreparedSide& side = contact.side(s);
-    if (states.is_static(side.body)) continue;
-    speed -= PreparedContact::sign(s) * n.dot(side.velocity(states));
-    gain -= PreparedContact::sign(s) * acceleration(states, side, n, gravity);
-  }
-  if (speed < 0.0 && gain <= 0.0) return 0.0;
-  return std::sqrt(std::max(0.0, speed * speed + 2.0 * gain * std::max(0.0, n.dot(contact.offset))));
+StartOfBody start_of(const BodyStates& states, Index body, const BodySurface& surface, const Vec3& gravity) {
+  StartOfBody start{.pose = states.pose(body, StepTime::kStart), .surface = surface};
+  start.surface.velocity = start.pose.q * surface.velocity;
+  start.is_static = states.is_static(body);
+  if (start.is_static) return start;
+  start.velocity = states.velocity(body, StepTime::kStart);
+  start.angular_velocity = states.angular_velocity(body, StepTime::kStart);
+  const auto& [group, slot, pose] = states.body(body);
+  const FrameConstants& c = group->frame_constants();
+  if (c.motion == FrameMotion::kFree)
+    start.acceleration = group->own_gravity(slot, gravity) + group->held_force(slot) / c.mass;
+  return start;
 }
 
 /// Constraints that are used anew in every step.
@@ -81,6 +82,12 @@ void ContactOptions::validate() const {
 struct ContactSet::Impl {
   ContactOptions options;
   std::vector<const ContactPoint*> points;  // of those that act
+  std::vector<const ContactMemory*> known;  // by point
+  std::vector<std::size_t> first_of_pair;   // by pair, and where the last one ends
+  std::vector<std::size_t> bending;         // those with a side that may bend
+  std::vector<StartOfBody> starts;          // of bodies that points name, the world first
+  std::vector<std::uint64_t> started;       // in which update
+  std::uint64_t updates = 0;
   std::vector<PreparedContact> contacts;
   std::vector<VertexShare> corners;  // of their sides, as what follows
   std::vector<Mat3> turns;
@@ -93,45 +100,100 @@ struct ContactSet::Impl {
   std::vector<Index> touched;  // scratch of finish()
 
   void resist_rolling(const BodyStates& states, std::span<const PreparedContact> pair);
-  void prepare(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around,
-               PreparedContact& contact) const;
-  void measure(const BodyStates& states, const Vec3& gravity, PreparedContact& contact) const;
+  void list(const BodyStates& states, std::span<const ContactPoint> found, const ContactSurroundings& around);
+  void prepare(const BodyStates& states, std::size_t number, const Vec3& origin);
+  void measure(const BodyStates& states, std::size_t number);
+  double approach(const BodyStates& states, const PreparedContact& contact, const Vec3 (&arms)[2]) const;
+  const StartOfBody& start(Index body) const { return starts[static_cast<std::size_t>(body + 1)]; }
   void add_corners(const BodyStates& states, PreparedSide& side);
 };
 
-/// But for what a skin's memory is asked for, which one thread may do at a time.
-void ContactSet::Impl::prepare(const BodyStates& states, const ContactPoint& point, const ContactSurroundings& around,
-                               PreparedContact& contact) const {
-  const auto surface = [&](Index body) {
-    const auto i = static_cast<std::size_t>(body);
-    return i < around.surfaces.size() ? around.surfaces[i] : BodySurface{.friction = options.friction};
+/// What acts, pair by pair, and the bodies that it is between.
+void ContactSet::Impl::list(const BodyStates& states, std::span<const ContactPoint> found,
+                            const ContactSurroundings& around) {
+  points.clear(), first_of_pair.clear(), bending.clear();
+  ++updates;
+  std::size_t bodies = 0;
+  const auto tell = [&](Index body) {
+    const auto i = static_cast<std::size_t>(body + 1);
+    bodies = std::max(bodies, i);
+    if (i >= starts.size()) starts.resize(i + 1), started.resize(i + 1, 0);
+    if (std::exchange(started[i], updates) == updates) return;
+    const bool told = body >= 0 && static_cast<std::size_t>(body) < around.surfaces.size();
+    starts[i] = start_of(states, body, told ? around.surfaces[i - 1] : BodySurface{.friction = options.friction},
+                         around.gravity);
   };
-  const BodySurface of_a = surface(point.a.body), of_b = surface(point.b.body);
+  for (const ContactPoint& point : found) {
+    tell(point.a.body), tell(point.b.body);
+    if (start(point.a.body).is_static && start(point.b.body).is_static) continue;
+    const std::size_t i = points.size();
+    if (i == 0 || points.back()->a.body != point.a.body || points.back()->b.body != point.b.body)
+      first_of_pair.push_back(i);
+    if (point.a.triangle >= 0 || point.b.triangle >= 0) bending.push_back(i);
+    points.push_back(&point);
+  }
+  first_of_pair.push_back(points.size());
+  history.reserve(bodies);
+  indentations.reserve(bodies);
+}
+
+/// But for what a skin's memory is asked for, which one thread may do at a time.
+void ContactSet::Impl::prepare(const BodyStates& states, std::size_t number, const Vec3& origin) {
+  const ContactPoint& point = *points[number];
+  const StartOfBody &a = start(point.a.body), &b = start(point.b.body);
+  PreparedContact& contact = contacts[number];
   contact = {};
   contact.id = point.id;
   make_side(states, point.a, point.normal, contact.a);
   make_side(states, point.b, -point.normal, contact.b);
   contact.axes = frame_along(point.normal);
-  const double smaller = std::min(of_a.friction, of_b.friction);
-  contact.friction = smaller > 0.0 ? std::sqrt(of_a.friction * of_b.friction) : 0.0;
+  const double smaller = std::min(a.surface.friction, b.surface.friction);
+  contact.friction = smaller > 0.0 ? std::sqrt(a.surface.friction * b.surface.friction) : 0.0;
   // Bodies that bend rebound by their modes.
-  contact.restitution = flexes(contact.a) || flexes(contact.b) ? 0.0 : std::max(of_a.restitution, of_b.restitution);
-  contact.running = states.pose(point.a.body, StepTime::kStart).q * of_a.velocity -
-                    states.pose(point.b.body, StepTime::kStart).q * of_b.velocity;
-  contact.start_position = point.position + around.origin;
-  contact.yielding = flexes(contact.a) || states.is_static(point.b.body) ? point.a.body : point.b.body;
-  if (states.is_static(contact.yielding)) contact.yielding = point.b.body;
-  if (contact.a.skin == nullptr && contact.b.skin == nullptr) measure(states, around.gravity, contact);
+  contact.restitution =
+      flexes(contact.a) || flexes(contact.b) ? 0.0 : std::max(a.surface.restitution, b.surface.restitution);
+  contact.running = a.surface.velocity - b.surface.velocity;
+  contact.start_position = point.position + origin;
+  contact.yielding = flexes(contact.a) || b.is_static ? point.a.body : point.b.body;
+  if (start(contact.yielding).is_static) contact.yielding = point.b.body;
+  if (contact.a.skin == nullptr && contact.b.skin == nullptr) measure(states, number);
 }
 
-void ContactSet::Impl::measure(const BodyStates& states, const Vec3& gravity, PreparedContact& contact) const {
-  for (PreparedSide* side : {&contact.a, &contact.b})
-    side->start_point = side->place(states.amplitudes(side->body, StepTime::kStart));
-  contact.offset = contact.a.start_position(states) - contact.b.start_position(states);
-  if (const ContactMemory* known = history.find(contact.id))
-    contact.last_force = known->force, contact.compliance = known->compliance, contact.slip = known->slip;
+void ContactSet::Impl::measure(const BodyStates& states, std::size_t number) {
+  PreparedContact& contact = contacts[number];
+  Vec3 arms[2], at[2];
+  for (std::size_t s = 0; s < 2; ++s) {
+    PreparedSide& side = s == 0 ? contact.a : contact.b;
+    if (side.model != nullptr) side.start_point = side.place(states.amplitudes(side.body, StepTime::kStart));
+    const RigidTransform& pose = start(side.body).pose;
+    arms[s] = pose.q * side.start_point;
+    at[s] = arms[s] + pose.p + side.rim;
+  }
+  contact.offset = at[0] - at[1];
+  if (const ContactMemory* last = known[number])
+    contact.last_force = last->force, contact.compliance = last->compliance, contact.slip = last->slip;
   else
-    contact.approach = approach(states, contact, gravity);
+    contact.approach = approach(states, contact, arms);
+}
+
+/// How fast a contact's points will come together as they meet; 0: they will not. @param arms from the bodies' origins
+double ContactSet::Impl::approach(const BodyStates& states, const PreparedContact& contact,
+                                  const Vec3 (&arms)[2]) const {
+  const Vec3 n = contact.axes.col(0);
+  double speed = 0.0, gain = 0.0;
+  for (std::size_t s = 0; s < 2; ++s) {
+    const PreparedSide& side = contact.side(s);
+    const StartOfBody& body = start(side.body);
+    if (body.is_static) continue;
+    Vec3 v = body.velocity + body.angular_velocity.cross(arms[s]);
+    if (side.model != nullptr)
+      v += body.pose.q *
+           side.deforming(states.amplitudes(side.body, StepTime::kStart), states.rates(side.body, StepTime::kStart));
+    speed -= PreparedContact::sign(s) * n.dot(v);
+    gain -= PreparedContact::sign(s) * n.dot(body.acceleration);
+  }
+  if (speed < 0.0 && gain <= 0.0) return 0.0;
+  return std::sqrt(std::max(0.0, speed * speed + 2.0 * gain * std::max(0.0, n.dot(contact.offset))));
 }
 
 /// @pre there is room: spans of them stay where they are
@@ -157,40 +219,32 @@ ContactSet& ContactSet::operator=(ContactSet&&) noexcept = default;
 void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> points,
                         const ContactSurroundings& surroundings, Jobs& jobs) {
   Impl& s = *impl_;
-  s.points.clear();
-  s.constraints.clear();
-  std::size_t bodies = 0;
-  for (const ContactPoint& point : points)
-    bodies = std::max(bodies, static_cast<std::size_t>(std::max({point.a.body, point.b.body, Index{-1}}) + 1));
-  s.history.reserve(bodies);
-  s.indentations.reserve(bodies);
-  s.corners.clear(), s.turns.clear();
-  s.corners.reserve(6 * points.size());  // three of each side
-  s.turns.reserve(2 * points.size());
-  for (const ContactPoint& point : points)
-    if (!states.is_static(point.a.body) || !states.is_static(point.b.body)) s.points.push_back(&point);
+  s.list(states, points, surroundings);
+  s.history.find(s.points, s.known);
   s.contacts.resize(s.points.size());
   const auto part = [&](std::size_t first, std::size_t end) {
-    for (std::size_t i = first; i < end; ++i) s.prepare(states, *s.points[i], surroundings, s.contacts[i]);
+    for (std::size_t i = first; i < end; ++i) s.prepare(states, i, surroundings.origin);
   };
   constexpr std::size_t kAtOnce = 64;
   jobs.parallel_for(s.contacts.size(), kAtOnce, std::ref(part));
-  for (PreparedContact& contact : s.contacts) {
+  s.corners.clear(), s.turns.clear();
+  s.corners.reserve(6 * s.bending.size());  // three of each side
+  s.turns.reserve(2 * s.bending.size());
+  for (const std::size_t i : s.bending) {
+    PreparedContact& contact = s.contacts[i];
     s.add_corners(states, contact.a);
     s.add_corners(states, contact.b);
-    if (contact.a.skin != nullptr || contact.b.skin != nullptr) s.measure(states, surroundings.gravity, contact);
+    if (contact.a.skin != nullptr || contact.b.skin != nullptr) s.measure(states, i);
   }
+  s.constraints.clear();
   s.pairs.reuse(), s.rolling.reuse();
-  std::size_t begin = 0;
-  for (std::size_t i = 1; i <= s.contacts.size(); ++i) {
-    const PreparedContact& first = s.contacts[begin];
-    if (i < s.contacts.size() && s.contacts[i].a.body == first.a.body && s.contacts[i].b.body == first.b.body) continue;
+  for (std::size_t p = 0; p + 1 < s.first_of_pair.size(); ++p) {
+    const std::size_t begin = s.first_of_pair[p];
     PairContacts& pair = s.pairs.next();
-    const std::span<PreparedContact> of_pair = std::span(s.contacts).subspan(begin, i - begin);
+    const std::span<PreparedContact> of_pair = std::span(s.contacts).subspan(begin, s.first_of_pair[p + 1] - begin);
     pair.set(of_pair, s.options, s.indentations);
     s.constraints.push_back(&pair);
     s.resist_rolling(states, of_pair);
-    begin = i;
   }
 }
 
@@ -204,7 +258,7 @@ void ContactSet::Impl::resist_rolling(const BodyStates& states, std::span<const 
                  std::max(0.0, contact.axes.col(0).dot(contact.last_force));
   if (largest == 0.0) return;
   const Index a = pair.front().a.body, b = pair.front().b.body;
-  const RollingMemory* last = find_in(rolling_memory, {.a = a, .b = b}, kByPair);
+  const RollingMemory* last = find_in(rolling_memory, RollingMemory{.a = a, .b = b}, kByPair);
   RollingResistance& resistance = rolling.next();
   resistance.set(a, b, largest, last != nullptr ? last->moment : Vec3(Vec3::Zero()));
   constraints.push_back(&resistance);
@@ -214,11 +268,12 @@ std::span<PreparedContact> ContactSet::prepared() { return impl_->contacts; }
 
 void ContactSet::press_indentations(const BodyStates& states) {
   if (!impl_->options.residual_compliance) return;
-  for (const PreparedContact& contact : impl_->contacts)
+  for (const std::size_t i : impl_->bending)
     for (std::size_t s = 0; s < 2; ++s)
-      if (yields(contact.side(s))) impl_->indentations.renew(contact.side(s).body);
-  for (const PreparedContact& contact : impl_->contacts)
+      if (const PreparedSide& side = impl_->contacts[i].side(s); yields(side)) impl_->indentations.renew(side.body);
+  for (const std::size_t i : impl_->bending)
     for (std::size_t s = 0; s < 2; ++s) {
+      const PreparedContact& contact = impl_->contacts[i];
       const PreparedSide& side = contact.side(s);
       if (!yields(side)) continue;
       const Quaternion q_BW = states.pose(side.body, StepTime::kStart).q.conjugate();
@@ -232,8 +287,8 @@ std::span<Constraint* const> ContactSet::constraints() const { return impl_->con
 void ContactSet::finish(std::span<const char> asleep, bool some_woke) {
   Impl& s = *impl_;
   s.touched.clear();
-  for (const PreparedContact& contact : s.contacts)
-    for (const PreparedSide* side : {&contact.a, &contact.b})
+  for (const std::size_t i : s.bending)
+    for (const PreparedSide* side : {&s.contacts[i].a, &s.contacts[i].b})
       if (yields(*side)) s.touched.push_back(side->body);
   s.history.finish(s.contacts, asleep, some_woke);
   s.indentations.finish(asleep, s.touched);
@@ -252,7 +307,7 @@ std::span<const ContactMemory> ContactSet::resting() const { return impl_->histo
 std::span<const RollingMemory> ContactSet::rolling() const { return impl_->rolling_memory; }
 
 void ContactSet::clear() {
-  impl_->contacts.clear();
+  impl_->contacts.clear(), impl_->bending.clear();
   impl_->constraints.clear();
   impl_->history.clear();
   impl_->rolling_memory.clear();
@@ -266,7 +321,7 @@ void ContactSet::save_state(StateWriter& state) const {
 
 void ContactSet::restore_state(StateReader& state) {
   Impl& s = *impl_;
-  s.contacts.clear();
+  s.contacts.clear(), s.bending.clear();
   s.constraints.clear();
   state(s.options, s.history, s.rolling_memory, s.indentations);
   s.indentations.list_loaded();

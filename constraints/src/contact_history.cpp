@@ -24,10 +24,7 @@ void ContactHistory::reserve(std::size_t bodies) {
 }
 
 void ContactHistory::finish(std::span<const PreparedContact> contacts, std::span<const char> asleep, bool some_woke) {
-  events_.clear(), pressed_.clear(), order_.clear();
-  for (std::size_t i = 0; i < contacts.size(); ++i)
-    if (!contacts[i].impulse.isZero(0.0)) order_.push_back({contacts[i].id, i});
-  std::ranges::sort(order_, kById);
+  events_.clear(), pressed_.clear();
   const std::size_t rested = resting_.size();
   auto last = memory_.begin();
   const auto leave = [&](const ContactMemory& memory, bool presses) {
@@ -36,16 +33,16 @@ void ContactHistory::finish(std::span<const PreparedContact> contacts, std::span
     else if (!presses)
       end(memory);
   };
-  for (const Pressing& pressing : order_) {
-    while (last != memory_.end() && last->id < pressing.id) leave(*last++, false);
-    const bool known = last != memory_.end() && last->id == pressing.id;
-    take(contacts[pressing.number], known || find_in(resting_, pressing.id) != nullptr);
+  for (const PreparedContact& contact : contacts) {
+    if (contact.impulse.isZero(0.0)) continue;
+    while (last != memory_.end() && kByKey(*last, contact)) leave(*last++, false);
+    const bool known = last != memory_.end() && key_of(*last) == key_of(contact);
+    take(contact, known || find_in(resting_, contact, kByKey) != nullptr);
     if (known) leave(*last++, true);
   }
   while (last != memory_.end()) leave(*last++, false);
   if (some_woke || resting_.size() > rested) renew_resting(asleep);
   std::swap(memory_, pressed_);
-  list_ids();
   find_energy(memory_, energy_);
 }
 
@@ -54,12 +51,12 @@ void ContactHistory::renew_resting(std::span<const char> asleep) {
   const std::size_t told = events_.size();
   std::erase_if(resting_, [&](const ContactMemory& last) {
     const bool wakes = !rests(asleep, last.a, last.b);
-    if (wakes && find_in(pressed_, last.id) == nullptr) end(last);
+    if (wakes && find_in(pressed_, last, kByKey) == nullptr) end(last);
     return wakes;
   });
-  std::ranges::sort(resting_, kById);
+  std::ranges::sort(resting_, kByKey);
   find_energy(resting_, resting_energy_);
-  if (events_.size() > told) std::ranges::sort(events_, kById);
+  if (events_.size() > told) std::ranges::sort(events_, kByKey);
 }
 
 void ContactHistory::take(const PreparedContact& contact, bool lasts) {
@@ -91,24 +88,23 @@ void ContactHistory::end(const ContactMemory& last) {
                      .normal = last.normal});
 }
 
-void ContactHistory::list_ids() {
-  ids_.clear();
-  for (const ContactMemory& memory : memory_) ids_.push_back(memory.id);
-}
-
 void ContactHistory::find_energies(std::size_t bodies) {
   reserve(bodies);
-  list_ids();
   find_energy(memory_, energy_);
   find_energy(resting_, resting_energy_);
 }
 
 void ContactHistory::clear() { *this = {}; }
 
-const ContactMemory* ContactHistory::find(std::uint64_t id) const {
-  const auto known = std::lower_bound(ids_.begin(), ids_.end(), id);
-  if (known != ids_.end() && *known == id) return &memory_[static_cast<std::size_t>(known - ids_.begin())];
-  return find_in(resting_, id);
+void ContactHistory::find(std::span<const ContactPoint* const> contacts,
+                          std::vector<const ContactMemory*>& known) const {
+  known.clear();
+  auto last = memory_.begin();
+  for (const ContactPoint* contact : contacts) {
+    while (last != memory_.end() && kByKey(*last, *contact)) ++last;
+    const bool pressed = last != memory_.end() && key_of(*last) == key_of(*contact);
+    known.push_back(pressed ? &*last : find_in(resting_, *contact, kByKey));
+  }
 }
 
 double ContactHistory::energy(Index body) const {

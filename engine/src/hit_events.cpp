@@ -10,6 +10,9 @@ namespace {
 using Pair = std::pair<std::uint32_t, std::uint32_t>;
 
 Pair pair_of(const HitEvent& hit) { return {hit.a.index, hit.b.index}; }
+Pair pair_of(const ContactEvent& contact) {
+  return {static_cast<std::uint32_t>(contact.a), static_cast<std::uint32_t>(contact.b)};
+}
 
 HitEvent make_hit(const ContactEvent& contact, const BodyTable& bodies) {
   const BodyTable::Entry &a = bodies[contact.a], &b = bodies[contact.b];
@@ -40,11 +43,10 @@ void HitEvents::update(std::span<const ContactEvent> contacts, double speed, con
   std::sort(events_.begin(), events_.end(), comes_before);
   const auto same = [](const HitEvent& x, const HitEvent& y) { return pair_of(x) == pair_of(y); };
   events_.erase(std::unique(events_.begin(), events_.end(), same), events_.end());
-  const auto before = [](const HitEvent& hit, const Pair& pair) { return pair_of(hit) < pair; };
-  for (const ContactEvent& contact : contacts) {
-    const Pair pair{static_cast<std::uint32_t>(contact.a), static_cast<std::uint32_t>(contact.b)};
-    const auto at = std::lower_bound(events_.begin(), events_.end(), pair, before);
-    if (at != events_.end() && pair_of(*at) == pair) at->impulse += contact.impulse;
+  auto contact = contacts.begin();
+  for (HitEvent& hit : events_) {
+    while (contact != contacts.end() && pair_of(*contact) < pair_of(hit)) ++contact;
+    for (; contact != contacts.end() && pair_of(*contact) == pair_of(hit); ++contact) hit.impulse += contact->impulse;
   }
 }
 

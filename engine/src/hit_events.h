@@ -11,7 +11,7 @@ namespace limber::internal {
 
 class HitEvents {
  public:
-  /// @param contacts of the step. @param speed m/s: slower ones are no hits
+  /// @param contacts of the step, by pair. @param speed m/s: slower ones are no hits
   void update(std::span<const ContactEvent> contacts, double speed, const BodyTable& bodies);
   std::span<const HitEvent> events() const { return events_; }
 

@@ -6,18 +6,19 @@
 namespace limber::internal {
 namespace {
 
-struct ById {
-  static std::uint64_t id(const ContactEvent& event) { return event.id; }
+/// The order of contacts.
+struct ByKey {
+  static auto key(const ContactEvent& event) { return std::tie(event.a, event.b, event.id); }
   template <class Merged>
-  static std::uint64_t id(const Merged& merged) {
-    return merged.event.id;
+  static auto key(const Merged& merged) {
+    return key(merged.event);
   }
   template <class X, class Y>
   bool operator()(const X& x, const Y& y) const {
-    return id(x) < id(y);
+    return key(x) < key(y);
   }
 };
-constexpr ById kById;
+constexpr ByKey kByKey;
 
 }  // namespace
 
@@ -26,14 +27,14 @@ void StepEvents::begin() {
   std::swap(events_, last_events_);
 }
 
-// Events come by id, and so do those that are known: each list is gone through once.
+// Events come in the order of contacts, and so do those that are known: each list is gone through once.
 void StepEvents::add(int substep, std::span<const ContactEvent> events) {
   const std::size_t known = merged_.size();
   std::size_t at = 0;
   auto last = last_events_.begin();
   for (const ContactEvent& event : events) {
-    while (at < known && merged_[at].event.id < event.id) ++at;
-    while (last != last_events_.end() && last->id < event.id) ++last;
+    while (at < known && kByKey(merged_[at], event)) ++at;
+    while (last != last_events_.end() && kByKey(*last, event)) ++last;
     const bool pressed_before =
         last != last_events_.end() && last->id == event.id && last->phase != ContactPhase::kEnded;
     if (at < known && merged_[at].event.id == event.id)
@@ -41,7 +42,7 @@ void StepEvents::add(int substep, std::span<const ContactEvent> events) {
     else
       merged_.push_back(first_of(event, substep, pressed_before));
   }
-  if (known > 0) std::sort(merged_.begin(), merged_.end(), kById);
+  if (known > 0) std::sort(merged_.begin(), merged_.end(), kByKey);
 }
 
 StepEvents::Merged StepEvents::first_of(const ContactEvent& event, int substep, bool pressed_before) {
@@ -67,7 +68,7 @@ void StepEvents::add_to(Merged& merged, const ContactEvent& event) {
 void StepEvents::end() {
   events_.clear();
   for (const ContactEvent& event : released_)
-    if (!std::binary_search(merged_.begin(), merged_.end(), event, kById)) {
+    if (!std::binary_search(merged_.begin(), merged_.end(), event, kByKey)) {
       events_.push_back(event);
       events_.back().phase = ContactPhase::kEnded;
       events_.back().impulse = Vec3::Zero();
@@ -78,7 +79,7 @@ void StepEvents::end() {
     events_.push_back(merged.event);
     if (merged.pressed && merged.let_go) released_.push_back(merged.event);
   }
-  if (released) std::sort(events_.begin(), events_.end(), kById);
+  if (released) std::sort(events_.begin(), events_.end(), kByKey);
 }
 
 }  // namespace limber::internal

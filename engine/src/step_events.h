@@ -36,7 +36,7 @@ class StepEvents {
   static Merged first_of(const ContactEvent& event, int substep, bool pressed_before);
   static void add_to(Merged& merged, const ContactEvent& event);
 
-  std::vector<Merged> merged_;  // by id
+  std::vector<Merged> merged_;  // in the order of contacts
   std::vector<ContactEvent> events_, last_events_;
   std::vector<ContactEvent> released_;  // told as pressing, but let go before the step's end
 };

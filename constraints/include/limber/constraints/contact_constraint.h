@@ -178,11 +178,11 @@ class ContactSet {
   /// @param some_woke whether a body that slept at the last call does not any more; where none did, those that sleep
   /// cost nothing
   void finish(std::span<const char> asleep = {}, bool some_woke = true);
-  /// Contacts that press, or have ceased to, in the last step, ordered by id.
+  /// Contacts that press, or have ceased to, in the last step, ordered by (a, b, id).
   std::span<const ContactEvent> events() const;
-  /// Contacts that pressed in the last step, ordered by id.
+  /// Contacts that pressed in the last step, ordered by (a, b, id).
   std::span<const ContactMemory> memory() const;
-  /// Those under which bodies fell asleep, ordered by id.
+  /// Those under which bodies fell asleep, ordered by (a, b, id).
   std::span<const ContactMemory> resting() const;
   /// Pairs that resisted rolling in the last step, ordered by (a, b).
   std::span<const RollingMemory> rolling() const;
