@@ -149,6 +149,7 @@ void PairBundles::fill(Jobs& jobs, const Visit& visit, const Point& point) {
 template <class Point>
 void PairBundles::fill_modes(std::size_t b, const Point& point) {
   const PairBundle& bundle = bundles_[b];
+  if (bundle.modes[0] + bundle.modes[1] == 0) return;
   const Lane* lanes = &lanes_[b * kBundleLanes];
   Block8* rows = rows_.data() + bundle.rows;
   ModePoint points[kBundleLanes];
