@@ -378,11 +378,14 @@ void ConvexContacts::clip_by_edge(const Side& reference, const ConvexFace& face,
   const Vec3& x1 = reference.points[static_cast<std::size_t>(loop[static_cast<std::size_t>((edge + 1) % face.count)])];
   const Vec3 outward = (x1 - x0).cross(reference.normal(face)).normalized();
   const double tolerance = kRoundOff * (x0.norm() + x1.norm());
-  const auto beyond = [&](const Corner& c) { return outward.dot(c.point - x0); };
+  heights_.clear();
+  for (const Corner& c : corners_) heights_.push_back(outward.dot(c.point - x0));
+  if (std::ranges::all_of(heights_, [&](double h) { return h <= tolerance; })) return;
   clipped_.clear();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
-    const Corner &from = corners_[i], &to = corners_[(i + 1) % corners_.size()];
-    const double h0 = beyond(from), h1 = beyond(to);
+    const std::size_t next = i + 1 < corners_.size() ? i + 1 : 0;
+    const Corner &from = corners_[i], &to = corners_[next];
+    const double h0 = heights_[i], h1 = heights_[next];
     const bool in0 = h0 <= tolerance, in1 = h1 <= tolerance;
     if (in0) clipped_.push_back(from);
     if (in0 == in1) continue;

@@ -135,6 +135,7 @@ class ConvexContacts {
 
   Side side_[2];
   std::vector<Corner> corners_, clipped_;
+  std::vector<double> heights_;  // of corners over what they are clipped to
   mutable std::vector<Vec3> moved_;
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::size_t first_ = 0;  // of the contacts of this pair
