@@ -12,7 +12,7 @@ namespace limber::internal {
 namespace {
 
 /// Changes with what is written.
-constexpr std::uint32_t kFormat = 6;
+constexpr std::uint32_t kFormat = 7;
 constexpr std::uint64_t kMagic = 0x6574617473626d6c;  // "lmbstate"
 
 struct Header {

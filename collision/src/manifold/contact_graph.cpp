@@ -52,6 +52,7 @@ std::uint32_t ContactGraph::take() {
 
 void ContactGraph::give_back(std::uint32_t slot) {
   slots_[slot].known = false;
+  slots_[slot].apart = 0.0;
   slots_[slot].parting = Vec3::Zero();
   room_->give_back(slots_[slot].points);
   free_.push_back(slot);

@@ -61,7 +61,9 @@ double ManifoldFinder::Impl::slack(const PairQuery& q) const {
   return parts * farthest(q) + options.recycle_turn * std::min(q.a.radius, q.b.radius);
 }
 
+/// Where two were farther apart than they have come since and may come, they still have no contacts.
 bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const {
+  if (pair.apart > 0.0 && pair.apart - way(q, pair.X_LS, q.X_LS) > q.reach) return true;
   const double farthest = this->farthest(q);
   if (!pair.known || (q.by_fields ? q.expected.near > pair.reach : q.reach > pair.reach + farthest)) return false;
   if (!q.by_fields && !hardly_moved(q, pair.X_LS, q.X_LS)) return false;
@@ -110,6 +112,7 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
     farther.reach += slack(q), farther.expected.near += slack(q);
   worker.made.clear(), worker.gaps.clear();
   const std::span<const FeatureContact> found = worker.pairs.find(farther, worker.last);
+  const double apart = worker.pairs.apart();
   keep(found, q, worker);
   if (follows) {
     worker.path.begin(q);
@@ -123,6 +126,7 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   pair.known = kept;
   pair.X_LS = q.X_LS;
   pair.reach = q.by_fields ? q.expected.near : q.reach;
+  pair.apart = worker.made.empty() ? apart : 0.0;
   pair.bent = {q.a.bent, q.b.bent};
 }
 

@@ -20,6 +20,7 @@ FeatureContact exchanged(const FeatureContact& c, const RigidTransform& X_AB) {
 
 std::span<const FeatureContact> PairFinder::find(const PairQuery& q, std::span<const std::uint64_t> last) {
   found_.clear();
+  apart_ = 0.0;
   const ConvexCore *core_a = q.a.core(), *core_b = q.b.core();
   if (core_a != nullptr && core_b != nullptr) {
     between_convex(q, *core_a, *core_b);
@@ -50,12 +51,12 @@ void PairFinder::keep_each_once() {
 }
 
 void PairFinder::between_convex(const PairQuery& q, const ConvexCore& a, const ConvexCore& b) {
-  if (q.planes_a.empty() && q.planes_b.empty())
-    convex_.find(a, b, q.X_AB, q.reach, found_, q.passing);
-  else
-    convex_.find_along(a, b, q.X_AB,
-                       q.planes_a.empty() ? Vec3(q.X_AB.q * -q.planes_b.front().normal) : q.planes_a.front().normal,
-                       q.reach, q.passing.ground, found_);
+  if (!q.planes_a.empty() || !q.planes_b.empty())
+    return convex_.find_along(
+        a, b, q.X_AB, q.planes_a.empty() ? Vec3(q.X_AB.q * -q.planes_b.front().normal) : q.planes_a.front().normal,
+        q.reach, q.passing.ground, found_);
+  convex_.find(a, b, q.X_AB, q.reach, found_, q.passing);
+  apart_ = convex_.apart();
 }
 
 /// A convex body and a half-space or a mesh, in the frame of the former, which is a of each contact.

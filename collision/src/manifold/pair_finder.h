@@ -24,6 +24,10 @@ class PairFinder {
   /// @param last feature_pair() of those of the last manifold
   std::span<const FeatureContact> find(const PairQuery& query, std::span<const std::uint64_t> last);
 
+  /// How far apart the two of the last find() are at least where that is farther than they were to be looked at, m; 0:
+  /// not known.
+  double apart() const { return apart_; }
+
   /// A body that deforms, in its state of this query.
   DeformedSurface& surface(Index index, const ManifoldBody& body, const BodyState& state) {
     return pool_.get(index, body.modal->surface, state.amplitudes);
@@ -50,6 +54,7 @@ class PairFinder {
   FieldContacts field_contacts_;
   std::vector<ContactPoint> contacts_;
   std::vector<FeatureContact> found_;
+  double apart_ = 0.0;
 };
 
 }  // namespace limber::internal

@@ -13,11 +13,11 @@ constexpr FeatureKey kNearestPoints = 3u << 30;
 
 ConvexSolid solid(std::span<const Vec3> points) { return {points, 0.0}; }
 
-// Whether a face of one of two boxes keeps them farther apart than that. @param h, k half extents of a, b
-bool boxes_are_apart(const Vec3& h, const Vec3& k, const RigidTransform& X_AB, double margin) {
+// How far a face of one of two boxes keeps them apart. @param h, k half extents of a, b
+double between_boxes(const Vec3& h, const Vec3& k, const RigidTransform& X_AB) {
   const Mat3 R = to_matrix(X_AB.q), size = R.cwiseAbs();
-  return ((X_AB.p.cwiseAbs() - h - size * k).array() > margin).any() ||
-         (((R.transpose() * X_AB.p).cwiseAbs() - k - size.transpose() * h).array() > margin).any();
+  return std::max((X_AB.p.cwiseAbs() - h - size * k).maxCoeff(),
+                  ((R.transpose() * X_AB.p).cwiseAbs() - k - size.transpose() * h).maxCoeff());
 }
 
 }  // namespace
@@ -61,9 +61,11 @@ void ConvexContacts::load(const ConvexCore& a, const ConvexCore& b, const RigidT
 
 void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
                           std::vector<FeatureContact>& contacts, const Passing& passing) {
-  if (a.half_extents[0] > 0.0 && b.half_extents[0] > 0.0 &&
-      boxes_are_apart(a.half_extents, b.half_extents, X_AB, margin + a.radius + b.radius))
-    return;
+  apart_ = 0.0;
+  if (a.half_extents[0] > 0.0 && b.half_extents[0] > 0.0) {
+    const double gap = between_boxes(a.half_extents, b.half_extents, X_AB) - a.radius - b.radius;
+    if (gap > margin) return part(gap);
+  }
   load(a, b, X_AB, contacts);
   ground_ = passing.ground;
   const std::size_t face_tests = a.faces.size() * b.points.size() + b.faces.size() * a.points.size();
@@ -159,7 +161,10 @@ ConvexContacts::Direction ConvexContacts::keeping_apart(const Passing& passing) 
 bool ConvexContacts::faces_tell(double margin) {
   const Direction face = across_faces();
   const double radii = side_[0].core->radius + side_[1].core->radius;
-  if (-face.depth - radii > margin) return true;
+  if (-face.depth - radii > margin) {
+    part(-face.depth - radii);
+    return true;
+  }
   if (face.depth > 0.0) {
     const Direction least = least_penetration(face);
     if (least.depth < 0.0) return false;
@@ -175,7 +180,7 @@ bool ConvexContacts::faces_tell(double margin) {
 void ConvexContacts::find_by_distance(double margin) {
   const double most = margin + side_[0].core->radius + side_[1].core->radius;
   const ConvexDistance nearest = distance(solid(side_[0].points), solid(side_[1].points), most);
-  if (!(nearest.distance <= most)) return;
+  if (!(nearest.distance <= most)) return part(nearest.distance - side_[0].core->radius - side_[1].core->radius);
   // Cores that are apart by little more than round-off may have any normal by their nearest points.
   if (nearest.cores_intersect || !(depth_along(nearest.normal) < 0.0)) {
     touch(least_penetration(across_faces()), nullptr, margin);

@@ -38,6 +38,8 @@ class ConvexContacts {
   // @param X_AB frame of b in that of a
   void find(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, double margin,
             std::vector<FeatureContact>& contacts, const Passing& passing = {});
+  // How far apart those of the last find() are at least that were farther than the margin, m; 0: they were not.
+  double apart() const { return apart_; }
   // Of the faces that look along a direction which is known to keep the two apart. @param normal unit, out of b into a
   // @param ground as in Passing
   void find_along(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB, const Vec3& normal,
@@ -107,6 +109,7 @@ class ConvexContacts {
   double least_gap() const;
   double round_off() const;
 
+  void part(double gap) { apart_ = gap; }
   void let_pass(const Passing& passing, double margin);
   Direction keeping_apart(const Passing& passing) const;
   bool faces_tell(double margin);
@@ -140,6 +143,7 @@ class ConvexContacts {
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::size_t first_ = 0;  // of the contacts of this pair
   int ground_ = -1;
+  double apart_ = 0.0;
 };
 
 }  // namespace limber::internal
