@@ -122,12 +122,25 @@ double SweptPath::turning_towards(const Vec3& normal) const {
          normal.cross(sides_[1].state.rotation).norm() * pair_->b.radius;
 }
 
-/// Whether a plane along the way keeps two convex shapes apart.
+/// Whether a plane along the way, or that of a face, keeps two convex shapes apart.
 bool SweptPath::pass_beside(double left) const {
+  const Vec3 along = way().normalized(), between = sides_[0].state.pose.p - sides_[1].state.pose.p;
+  if (keeps_apart((between - along.dot(between) * along).normalized(), left)) return true;
+  for (std::size_t s = 0; s < 2; ++s) {
+    const ConvexCore& core = *(s == 0 ? pair_->a : pair_->b).core();
+    const Mat3 R = to_matrix(sides_[s].state.pose.q);
+    for (const ConvexFace& face : core.faces)
+      if (keeps_apart(R * (s == 0 ? Vec3(-face.normal) : face.normal), left)) return true;
+  }
+  return false;
+}
+
+/// Whether a plane does, all along what is left of the way. @param normal unit, from b to a
+bool SweptPath::keeps_apart(const Vec3& normal, double left) const {
   const RigidTransform &X_WA = sides_[0].state.pose, &X_WB = sides_[1].state.pose;
-  const Vec3 along = way().normalized(), between = X_WA.p - X_WB.p;
-  const Vec3 normal = (between - along.dot(between) * along).normalized();
-  const double gap = normal.dot(between) - pair_->a.core()->reach(X_WA.q.conjugate() * -normal) -
+  const double least = normal.dot(X_WA.p - X_WB.p) + std::min(0.0, left * normal.dot(way()));
+  if (!(least > 0.0)) return false;
+  const double gap = least - pair_->a.core()->reach(X_WA.q.conjugate() * -normal) -
                      pair_->b.core()->reach(X_WB.q.conjugate() * normal);
   return turning_towards(normal) * left <= gap - collision_tuning().impact.kept_gap * margin_;
 }

@@ -50,6 +50,7 @@ class SweptPath {
   ImpactTime touch_of_cores(double left, double least);
   double turning_towards(const Vec3& normal) const;
   bool pass_beside(double left) const;
+  bool keeps_apart(const Vec3& normal, double left) const;
   Vec3 way() const;
   Vec3 pair_b_in_a() const;
 
