@@ -152,11 +152,11 @@ void GameRows::write_row(const GameBodies& bodies, const GameGroup& group, std::
   row.target = row.rate = h * law.end_rate;
   row.compliance = h * law.compliance;
   for (const GameSide& side : group.sides)
-    for (std::int32_t b = 1; b < side.blocks; ++b) {
-      const Block8& shape = bodies.shapes()[static_cast<std::size_t>(side.body + b)];
-      const auto at = static_cast<std::size_t>(side.at + static_cast<std::int32_t>(i) * side.blocks + b);
-      row.target += Eigen::Map<const Eigen::Matrix<double, 8, 1>>(numbers_[at].v)
-                        .dot(Eigen::Map<const Eigen::Matrix<float, 8, 1>>(shape.v).cast<double>());
+    for (std::ptrdiff_t b = 1; b < side.blocks; ++b) {
+      const Double8& of_row = numbers_.data()[side.at + static_cast<std::ptrdiff_t>(i) * side.blocks + b];
+      const Block8& shape = bodies.shapes().data()[side.body + b];
+      row.target += Eigen::Map<const Eigen::Matrix<double, 8, 1>>(of_row.v).dot(
+          Eigen::Map<const Eigen::Matrix<float, 8, 1>>(shape.v).cast<double>());
     }
   const bool bounded = row.is_bounded(), from_below = law.lower == 0.0, from_above = law.upper == 0.0,
              gives_way = bounded && !from_below && !from_above;
@@ -207,7 +207,7 @@ void GameRows::widen(std::span<const RowBody> at, const std::vector<Block8>& y, 
 void GameRows::add_energy_slopes(const GameBodies& bodies, std::span<const RowBody> at, const std::vector<Block8>& y,
                                  std::span<const Double8> more, std::vector<Double8>& slopes) {
   for (const RowBody& body : at) {
-    slope_.resize(static_cast<std::size_t>(8 * body.blocks));
+    slope_.resize(8 * static_cast<std::size_t>(body.blocks));
     bodies.write_energy_slopes(body.frame, y, slope_.data());
     for (std::size_t l = 0; l < 6 && !more.empty(); ++l) slope_[l] += more[static_cast<std::size_t>(body.first)].v[l];
     for (std::size_t l = 3; l < 6; ++l) slope_[l] *= weights_[static_cast<std::size_t>(body.frame)].v[l];
