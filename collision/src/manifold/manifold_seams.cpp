@@ -105,7 +105,9 @@ void ManifoldFinder::Impl::list_supports(Index body, ManifoldWorker& worker) {
       const Support here{out, offset, touch.lowest, p};
       if (seams.supports.size() == first ||
           (out - seams.supports.back().out).squaredNorm() > same_normal * same_normal) {
-        if (reach(body, out) - reach(body, -out) >= 2.0 * offset) seams.supports.push_back(here);
+        const Vec3 out_B = at(body).turn.transpose() * out;
+        if (at(body).core()->reach(out_B) - at(body).core()->reach(-out_B) >= 2.0 * offset)
+          seams.supports.push_back(here);
       } else if (touch.lowest < seams.supports.back().lowest) {
         seams.supports.back() = here;
       }

@@ -55,6 +55,7 @@ void ConvexContacts::load(Side& side, const ConvexCore& core, const RigidTransfo
 void ConvexContacts::load(const ConvexCore& a, const ConvexCore& b, const RigidTransform& X_AB,
                           std::vector<FeatureContact>& contacts) {
   load(side_[0], a, nullptr), load(side_[1], b, &X_AB);
+  depths_.clear();
   contacts_ = &contacts, first_ = contacts.size();
   ground_ = -1;
 }
@@ -99,6 +100,7 @@ void ConvexContacts::find_along(const ConvexCore& a, const ConvexCore& b, const 
 void ConvexContacts::find_on_triangle(const ConvexCore& a, const ConvexCore& triangle, const TriangleQuery& query,
                                       DirectionFilter& leaves, std::vector<FeatureContact>& contacts) {
   load(side_[0], a, nullptr), load(side_[1], triangle, nullptr);
+  depths_.clear();
   contacts_ = &contacts, first_ = contacts.size(), ground_ = 1;
   const ConvexFace& face = triangle.faces.front();
   const double gap = lowest(side_[0], face.normal) - face.offset - a.radius, touching = query.passing.touching;
@@ -130,7 +132,7 @@ void ConvexContacts::find_on_triangle(const ConvexCore& a, const ConvexCore& tri
 
 // The direction of least depth of those that are allowed.
 // @return false: the triangle does not reach into the other at all
-bool ConvexContacts::leave_triangle(Direction& best, DirectionFilter& leaves) const {
+bool ConvexContacts::leave_triangle(Direction& best, DirectionFilter& leaves) {
   bool apart = false;
   const auto look = [&](double preference) {
     return [&, preference](const Vec3& normal, double depth) {
@@ -145,7 +147,7 @@ bool ConvexContacts::leave_triangle(Direction& best, DirectionFilter& leaves) co
 
 // Of the faces behind which the other body is, and stays all along the way, the one that keeps it farthest; of infinite
 // depth if there is none.
-ConvexContacts::Direction ConvexContacts::keeping_apart(const Passing& passing) const {
+ConvexContacts::Direction ConvexContacts::keeping_apart(const Passing& passing) {
   Direction best;
   const double most = passing.touching - side_[0].core->radius - side_[1].core->radius;
   for_faces([&](const Vec3& normal, double depth) {
@@ -220,21 +222,20 @@ double ConvexContacts::round_off() const {
 
 // -- Direction of two cores that intersect ----------------------------------------------------------------------------
 
-// Calls visit(normal, depth) for the faces of both.
+// Calls visit(normal, depth) for the faces of both. Depths are found when they are first asked for.
 template <class Visit>
-void ConvexContacts::for_faces(const Visit& visit) const {
-  for (const ConvexFace& f : side_[0].core->faces) {
-    const Vec3& n = side_[0].normal(f);
-    visit(Vec3(-n), side_[0].offset(f) - lowest(side_[1], n));
-  }
-  for (const ConvexFace& f : side_[1].core->faces) {
-    const Vec3& n = side_[1].normal(f);
-    visit(n, side_[1].offset(f) - lowest(side_[0], n));
-  }
+void ConvexContacts::for_faces(const Visit& visit) {
+  if (depths_.empty())
+    for (std::size_t s = 0; s < 2; ++s)
+      for (const ConvexFace& f : side_[s].core->faces)
+        depths_.push_back(side_[s].offset(f) - lowest(side_[1 - s], side_[s].normal(f)));
+  auto depth = depths_.begin();
+  for (const ConvexFace& f : side_[0].core->faces) visit(Vec3(-side_[0].normal(f)), *depth++);
+  for (const ConvexFace& f : side_[1].core->faces) visit(side_[1].normal(f), *depth++);
 }
 
 // Of the faces of both, the one along which they overlap least.
-ConvexContacts::Direction ConvexContacts::across_faces() const {
+ConvexContacts::Direction ConvexContacts::across_faces() {
   Direction best;
   for_faces([&](const Vec3& normal, double depth) { take_shallower(best, normal, depth, 1.0); });
   return best;

@@ -111,18 +111,18 @@ class ConvexContacts {
 
   void part(double gap) { apart_ = gap; }
   void let_pass(const Passing& passing, double margin);
-  Direction keeping_apart(const Passing& passing) const;
+  Direction keeping_apart(const Passing& passing);
   bool faces_tell(double margin);
   void find_by_distance(double margin);
   void touch(const Direction& d, const Deepest* known, double margin);
 
   template <class Visit>
-  void for_faces(const Visit& visit) const;
-  Direction across_faces() const;
+  void for_faces(const Visit& visit);
+  Direction across_faces();
   Direction least_penetration(const Direction& across_faces) const;
   template <class Visit>
   void for_edges(const Visit& visit) const;
-  bool leave_triangle(Direction& best, DirectionFilter& leaves) const;
+  bool leave_triangle(Direction& best, DirectionFilter& leaves);
   double depth_along(const Vec3& normal) const;
   static void take_shallower(Direction& best, const Vec3& normal, double depth, double preference);
   Vec3 across_edges() const;
@@ -139,6 +139,7 @@ class ConvexContacts {
   Side side_[2];
   std::vector<Corner> corners_, clipped_;
   std::vector<double> heights_;  // of corners over what they are clipped to
+  std::vector<double> depths_;   // across the faces of both, once asked for
   mutable std::vector<Vec3> moved_;
   std::vector<FeatureContact>* contacts_ = nullptr;
   std::size_t first_ = 0;  // of the contacts of this pair
