@@ -66,8 +66,9 @@ void FieldEdges::find_at_end(int of, const SampleFoot& sample) {
     const auto corner =
         static_cast<std::size_t>(std::ranges::find(mine.triangle(t), sample.vertex) - mine.triangle(t).begin());
     const Index e = mine.edge_of(t, static_cast<int>(corner));
+    if (!view.mine->shell().sticks_out(e)) continue;
     const Vec3f to = view.placed(view.mine->vertex(mine.triangle(t)[(corner + 1) % 3]));
-    if (!view.mine->shell().sticks_out(e) || out.dot(to - sample.at) >= 0.0f) continue;  // the distance rises
+    if (out.dot(to - sample.at) >= 0.0f) continue;  // the distance rises
     if (goes_through_face(of, e, sample.foot.triangle, sample.at, to)) continue;
     if (met_.empty())
       for_edges_at(other, sample.foot, [&](Index f) {
