@@ -95,7 +95,7 @@ void FieldView::see_field() {
   set_frame(query, turn, shift);
 }
 
-bool FieldView::apart() const {
+bool FieldView::apart(Parting* parting) const {
   const Vec3f middle = 0.5f * (mine->low() + mine->high()), half_mine = 0.5f * (mine->high() - mine->low());
   const Vec3f centre = placed(middle) - 0.5f * (other->low() + other->high());
   const Vec3f half = turn.cwiseAbs() * half_mine + 0.5f * (other->high() - other->low());
@@ -104,7 +104,9 @@ bool FieldView::apart() const {
   const float spread = query.turning * half_mine.norm() + query.swing + fall + query.curve;
   // On one side now and then, the same one.
   const Vec3f beyond = centre.cwiseMin(then).cwiseMax(-centre.cwiseMax(then)) - half;
-  return beyond.maxCoeff() > query.reach + spread;
+  if (!(beyond.maxCoeff() > query.reach + spread)) return false;
+  if (parting != nullptr) parting->gap = static_cast<double>((centre.cwiseAbs() - half).maxCoeff() - fall);
+  return true;
 }
 
 FeatureSide at_vertex(const DeformedPointshell& body, Index v) {
@@ -231,10 +233,10 @@ void FieldContacts::find_between(const FieldBody& a, const FieldBody& b) {
   const double slack = collision_tuning().field.slack;
   view_[0].place(*a.shell, *b.shell, motion_.X_AB.inverse(), motion_.end.inverse(),
                  motion_.X_AB.q.conjugate() * motion_.fall, comes_near(1) + slack * b.shell->shell().cell());
-  if (view_[0].apart()) return;
+  if (view_[0].apart(motion_.parting)) return;
   view_[1].place(*b.shell, *a.shell, motion_.X_AB, motion_.end, motion_.fall,
                  comes_near(0) + slack * a.shell->shell().cell());
-  if (view_[1].apart() || part(view_[0], view_[1], static_cast<float>(reach_), motion_.parting)) return;
+  if (view_[1].apart(motion_.parting) || part(view_[0], view_[1], static_cast<float>(reach_), motion_.parting)) return;
   for (FieldView& view : view_) view.see_field();
   edges_.begin(view_[0], view_[1], static_cast<float>(reach_), static_cast<float>(motion_.passed));
   SampleBounds bounds[2];

@@ -37,7 +37,7 @@ struct FieldMotion {
   RigidTransform X_AB{}, end{};  ///< now, and as expected at the step's end
   Vec3 fall = Vec3::Zero();      ///< frame of a, m: one of the two may do that beside it (ContactQuery::fall)
   double passed = 0.0;           ///< m: planes that were passed by so much still keep a and b apart
-  Vec3* parting = nullptr;       ///< the direction along which they are farthest apart, from query to query, see part()
+  Parting* parting = nullptr;    ///< from query to query, see part()
 };
 
 /// Holds the scratch of one thread, and allocates nothing once warm. The same contacts in the same order whatever was

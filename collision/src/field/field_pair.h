@@ -14,6 +14,13 @@ namespace limber::internal {
 /// Part of lengths that is noise in single precision, after some sums: directions between points nearer than that.
 inline constexpr float kNoise = 1e-5f;
 
+/// What is known of a plane between two bodies that touch nowhere.
+struct Parting {
+  Vec3 direction = Vec3::Zero();  ///< along which they are farthest apart, out of b, frame of a; zero: nobody knows
+  /// m: they are so far apart now, a fall taken off; 0: not parted
+  double gap = 0.0;
+};
+
 /// One body's surface as the other's field sees it.
 struct FieldView {
   const DeformedPointshell* mine = nullptr;
@@ -30,7 +37,8 @@ struct FieldView {
   /// The rest. @pre place()
   void see_field();
   /// Whether the boxes of both are farther apart than the query's reach along an axis of the field's frame.
-  bool apart() const;
+  /// @param parting out, if they are: the gap now. Or null
+  bool apart(Parting* parting) const;
   Vec3f placed(const Vec3f& p) const { return turn * p + shift; }
   Vec3f turned_back(const Vec3f& direction) const { return turn.transpose() * direction; }
   /// What the turn is expected to change by.

@@ -32,6 +32,8 @@ struct Look {
     a = lowest_samples(b_in_a.other->view(), of_a), b = lowest_samples(b_in_a.mine->view(), of_b);
   }
   float gap(int end) const { return a.height[end] + b.height[end] - fall; }
+  // Of the fall, across the direction.
+  float aside(const FieldView& b_in_a) const { return Eigen::Map<const Vec3f>(b_in_a.query.fall).norm() - fall; }
   // From b to a.
   Vec3f between(const FieldView& b_in_a, int end) const {
     const Index v = b_in_a.other->shell().sample_vertex(a.sample[end]),
@@ -42,10 +44,9 @@ struct Look {
   // @param reach of contacts
   void leave_planes(float reach, FieldView& a_in_b, FieldView& b_in_a) const {
     a_in_b.query.above = of_a, b_in_a.query.above = of_b;
-    const float aside = Eigen::Map<const Vec3f>(b_in_a.query.fall).norm() - fall;
     for (int end = 0; end < 2; ++end) {
-      a_in_b.query.above.base[end] += b.height[end] + aside + (a_in_b.query.reach - reach);
-      b_in_a.query.above.base[end] += a.height[end] + aside + (b_in_a.query.reach - reach);
+      a_in_b.query.above.base[end] += b.height[end] + aside(b_in_a) + (a_in_b.query.reach - reach);
+      b_in_a.query.above.base[end] += a.height[end] + aside(b_in_a) + (b_in_a.query.reach - reach);
     }
   }
 };
@@ -54,15 +55,16 @@ Vec3f middle(const DeformedPointshell& body) { return 0.5f * (body.low() + body.
 
 }  // namespace
 
-bool part(FieldView& a_in_b, FieldView& b_in_a, float reach, Vec3* first) {
+bool part(FieldView& a_in_b, FieldView& b_in_a, float reach, Parting* parting) {
   FieldQuery& query = b_in_a.query;
   query.above = a_in_b.query.above = {};
   const float noise = kNoise * static_cast<float>(b_in_a.mine->shell().longest_side());
   const float enough = reach + noise + query.curve;
-  const bool known = first != nullptr && !first->isZero(0.0);
-  Vec3f nearest = known ? first->cast<float>() : Vec3f(middle(*b_in_a.other) - b_in_a.placed(middle(*b_in_a.mine)));
+  const bool known = parting != nullptr && !parting->direction.isZero(0.0);
+  Vec3f nearest =
+      known ? parting->direction.cast<float>() : Vec3f(middle(*b_in_a.other) - b_in_a.placed(middle(*b_in_a.mine)));
   Vec3f last = Vec3f::Zero();
-  float best = -std::numeric_limits<float>::infinity();
+  float best = -std::numeric_limits<float>::infinity(), now = best;
   const FieldTuning& tuning = collision_tuning().field;
   for (int i = 0, looks = known ? tuning.looks_apart / 2 : tuning.looks_apart; i < looks; ++i) {
     const float length = nearest.norm();
@@ -71,7 +73,8 @@ bool part(FieldView& a_in_b, FieldView& b_in_a, float reach, Vec3* first) {
     const int end = look.gap(1) < look.gap(0) ? 1 : 0;
     if (look.gap(end) > best) {
       best = look.gap(end);
-      if (first != nullptr) *first = (nearest / length).cast<double>();
+      if (parting != nullptr) parting->direction = (nearest / length).cast<double>();
+      now = look.gap(0) - look.aside(b_in_a);
       look.leave_planes(reach, a_in_b, b_in_a);
     }
     if (best > enough || (i > 0 && best >= static_cast<float>(tuning.looked_enough) * length)) break;
@@ -80,6 +83,7 @@ bool part(FieldView& a_in_b, FieldView& b_in_a, float reach, Vec3* first) {
                                  next};
     nearest = closest_on_triangle(Vec3::Zero(), corners).point.cast<float>(), last = next.cast<float>();
   }
+  if (best > enough && parting != nullptr) parting->gap = static_cast<double>(now - noise);
   return best > enough;
 }
 

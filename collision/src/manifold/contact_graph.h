@@ -36,8 +36,8 @@ struct LivePair {
   bool known = false;               ///< a manifold was made
   RigidTransform X_LS{};            ///< then: the smaller body in the frame of the larger one
   double reach = 0.0;               ///< gaps up to here were asked for, m
-  double apart = 0.0;               ///< so far at least rigid ones without contacts were from each other, m; 0: nearer
-  Vec3 parting = Vec3::Zero();      ///< of pairs by fields, see FieldMotion; zero: not looked for yet
+  double apart = 0.0;               ///< so far at least those without contacts were from each other, m; 0: nearer
+  Vec3 parting = Vec3::Zero();      ///< of pairs by fields, see Parting; zero: not looked for yet
   std::array<double, 2> bent{};     ///< how far a and b had bent until then
   std::vector<KeptPoint> points{};  ///< ascending in id
 

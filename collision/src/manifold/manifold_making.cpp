@@ -63,11 +63,13 @@ double ManifoldFinder::Impl::slack(const PairQuery& q) const {
 
 /// Where two were farther apart than they have come since and may come, they still have no contacts.
 bool ManifoldFinder::Impl::keeps(const LivePair& pair, const PairQuery& q) const {
-  if (pair.apart > 0.0 && pair.apart - way(q, pair.X_LS, q.X_LS) > q.reach) return true;
+  const double bent = q.a.bent - pair.bent[0] + q.b.bent - pair.bent[1];
+  if (pair.apart > 0.0 &&
+      pair.apart - way(q, pair.X_LS, q.X_LS) - bent > (q.by_fields ? q.expected.near + comes(q) : q.reach))
+    return true;
   const double farthest = this->farthest(q);
   if (!pair.known || (q.by_fields ? q.expected.near > pair.reach : q.reach > pair.reach + farthest)) return false;
   if (!q.by_fields && !hardly_moved(q, pair.X_LS, q.X_LS)) return false;
-  const double bent = q.a.bent - pair.bent[0] + q.b.bent - pair.bent[1];
   return q.by_fields ? way(q, pair.X_LS, q.X_LS) + bent + comes(q) <= slack(q) : bent <= farthest;
 }
 
@@ -105,7 +107,8 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   const bool follows = !q.by_fields && internal::SweptPath::is_needed(q);
   const bool kept = !follows && lasts(q);
   PairQuery farther = q;
-  farther.expected.parting = &pair.parting;
+  internal::Parting parting{pair.parting};
+  farther.expected.parting = &parting;
   if (follows)
     farther.reach = internal::SweptPath::near_at_start(q);
   else if (kept)
@@ -123,6 +126,7 @@ void ManifoldFinder::Impl::make(LivePair& pair, const PairQuery& q, ManifoldWork
   graph.make_room(pair, worker.made.size());
   pair.points.assign(worker.made.begin(), worker.made.end());
   std::sort(pair.points.begin(), pair.points.end(), [](const KeptPoint& p, const KeptPoint& r) { return p.id < r.id; });
+  pair.parting = parting.direction;
   pair.known = kept;
   pair.X_LS = q.X_LS;
   pair.reach = q.by_fields ? q.expected.near : q.reach;

@@ -31,6 +31,7 @@ std::span<const FeatureContact> PairFinder::find(const PairQuery& q, std::span<c
     for (FeatureContact& c : found_) c = exchanged(c, q.X_AB);
   } else if (q.by_fields) {
     fields_->find(q, field_contacts_, found_);
+    if (q.expected.parting != nullptr) apart_ = q.expected.parting->gap;
   } else {
     by_narrow_phase(q);
   }

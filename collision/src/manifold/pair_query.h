@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include "field/field_pair.h"
 #include "limber/dynamics/contact_source.h"
 #include "manifold/manifold_body.h"
 #include "manifold/mesh_contacts.h"
@@ -29,8 +30,8 @@ struct PairQuery {
   struct {
     RigidTransform X_AB_end{}, X_LS_end{};
     double near = 0.0;
-    Vec3 fall = Vec3::Zero();  ///< ContactQuery::fall, frame of a
-    Vec3* parting = nullptr;   ///< see FieldMotion
+    Vec3 fall = Vec3::Zero();    ///< ContactQuery::fall, frame of a
+    Parting* parting = nullptr;  ///< see FieldMotion
   } expected{};
 };
 
