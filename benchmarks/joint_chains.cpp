@@ -1,7 +1,7 @@
 // Joints at game quality (ContactSolver::kGame, 8 substeps, 60 steps a second): how long chains take, how far their
 // joints open, and what the energy does. Prints Markdown.
 // Usage: joint_chains [chains|ends|figures|grid]
-// Times are without what the clock adds. Figures: docs/performance.md.
+// Times are without what the clock adds. Figures: docs/reports/benchmarks.md.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
