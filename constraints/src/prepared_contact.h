@@ -62,14 +62,6 @@ struct PreparedSide {
   Vec3 deforming(std::span<const double> z, std::span<const double> rates) const {
     return shape(z).velocity(at, rates);
   }
-  /// At the step's start, world, of the point that the body carries along: of what is round the centre.
-  Vec3 velocity(const BodyStates& states) const {
-    constexpr StepTime kStart = StepTime::kStart;
-    const Quaternion& q = states.pose(body, kStart).q;
-    Vec3 v = states.velocity(body, kStart) + states.angular_velocity(body, kStart).cross(q * start_point);
-    if (model != nullptr) v += q * deforming(states.amplitudes(body, kStart), states.rates(body, kStart));
-    return v;
-  }
 };
 
 struct PreparedContact {

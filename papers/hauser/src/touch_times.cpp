@@ -30,11 +30,21 @@ Vec3 turn_of_normal(const BodyStates& states, const PreparedContact& contact) {
                           : Vec3(Vec3::Zero());
 }
 
+/// At the step's start, world, of the point that a side's body carries along: of what is round the centre.
+Vec3 velocity_of(const BodyStates& states, const PreparedSide& side) {
+  constexpr StepTime kStart = StepTime::kStart;
+  const Quaternion& q = states.pose(side.body, kStart).q;
+  Vec3 v = states.velocity(side.body, kStart) + states.angular_velocity(side.body, kStart).cross(q * side.start_point);
+  if (side.model != nullptr)
+    v += q * side.deforming(states.amplitudes(side.body, kStart), states.rates(side.body, kStart));
+  return v;
+}
+
 /// The acceleration of the point that a side's body carries along, if the body keeps its velocities: ω × (ω × p) +
 /// 2 ω × R J ż, [H03] equation 20; what J itself changes by is left out.
 Vec3 bias_of(const BodyStates& states, const PreparedSide& side) {
   const Vec3 omega = states.angular_velocity(side.body, StepTime::kStart);
-  const Vec3 relative = side.velocity(states) - states.velocity(side.body, StepTime::kStart);
+  const Vec3 relative = velocity_of(states, side) - states.velocity(side.body, StepTime::kStart);
   const Vec3 turning = omega.cross(states.pose(side.body, StepTime::kStart).q * side.start_point);
   return omega.cross(2.0 * relative - turning);
 }
@@ -102,7 +112,7 @@ void bias_accelerations(const PairContacts& contacts, const BodyStates& states, 
     const Vec3 apart = a.start_position(states) - a.rim - (b.start_position(states) - b.rim);
     for (Index axis = 0; axis < contact.rows(); ++axis)
       bias[row + static_cast<std::size_t>(axis)] = contact.axes.col(axis).dot(bias_ab);
-    bias[row] += 2.0 * turn.dot(a.velocity(states) - b.velocity(states)) - turn.squaredNorm() * n.dot(apart);
+    bias[row] += 2.0 * turn.dot(velocity_of(states, a) - velocity_of(states, b)) - turn.squaredNorm() * n.dot(apart);
     row += static_cast<std::size_t>(contact.rows());
   }
 }
