@@ -114,7 +114,7 @@ void PairBundles::fill_lane(const GameBodies& bodies, const Chunk& chunk, PairBu
     const double h = bodies.plan().length();
     if (body.led >= 0) bundle.carried = true;
     for (int i = 0; i < 3; ++i) {
-      if (body.root_mass > 0.0) bundle.root[s][i].v[lane] = static_cast<float>(h / body.root_mass * body.goes[i]);
+      bundle.root[s][i].v[lane] = static_cast<float>(body.shift[i]);
       for (int j = 0; j < 3; ++j) bundle.scale[s][i][j].v[lane] = static_cast<float>(h * body.turn_scale(i, j));
     }
   }

@@ -77,10 +77,13 @@ void RowSystem::factor(const GameRows& rows, bool closing) {
   list_met(rows, closing);
   factor_.begin(sizes_);
   const std::span<const GameGroup> groups = rows.groups();
+  const auto multiply = [&](std::size_t r, std::size_t s, double* to) {
+    multiply_pair(rows.arrays(), {&groups[r], met(r).data(), met(r).size()}, {&groups[s], met(s).data(), met(s).size()},
+                  to);
+  };
   for (std::size_t g = 0; g < groups.size(); ++g) {
     double* to = factor_.diagonal(g);
-    const RowsOfGroup of{&groups[g], met(g).data(), met(g).size()};
-    multiply_pair(rows.arrays(), of, of, to);
+    multiply(g, g, to);
     const std::span<const std::int32_t> met = this->met(g);
     for (std::size_t i = 0; i < met.size(); ++i) {
       double& own = to[i * met.size() + i];
@@ -90,9 +93,7 @@ void RowSystem::factor(const GameRows& rows, bool closing) {
   }
   for (std::size_t c = 0; c < graph_.size(); ++c) {
     const std::int32_t of_rows = factor_.rows_of(c), of_columns = graph_[c][0] == of_rows ? graph_[c][1] : graph_[c][0];
-    const auto r = static_cast<std::size_t>(of_rows), s = static_cast<std::size_t>(of_columns);
-    multiply_pair(rows.arrays(), {&groups[r], met(r).data(), met(r).size()}, {&groups[s], met(s).data(), met(s).size()},
-                  factor_.block(c));
+    multiply(static_cast<std::size_t>(of_rows), static_cast<std::size_t>(of_columns), factor_.block(c));
   }
   factor_.factor();
 }
