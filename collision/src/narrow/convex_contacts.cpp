@@ -65,7 +65,7 @@ void ConvexContacts::find(const ConvexCore& a, const ConvexCore& b, const RigidT
   apart_ = 0.0;
   if (a.half_extents[0] > 0.0 && b.half_extents[0] > 0.0) {
     const double gap = between_boxes(a.half_extents, b.half_extents, X_AB) - a.radius - b.radius;
-    if (gap > margin) return part(gap);
+    if (gap > margin) return void(apart_ = gap);
   }
   load(a, b, X_AB, contacts);
   ground_ = passing.ground;
@@ -164,7 +164,7 @@ bool ConvexContacts::faces_tell(double margin) {
   const Direction face = across_faces();
   const double radii = side_[0].core->radius + side_[1].core->radius;
   if (-face.depth - radii > margin) {
-    part(-face.depth - radii);
+    apart_ = -face.depth - radii;
     return true;
   }
   if (face.depth > 0.0) {
@@ -182,7 +182,8 @@ bool ConvexContacts::faces_tell(double margin) {
 void ConvexContacts::find_by_distance(double margin) {
   const double most = margin + side_[0].core->radius + side_[1].core->radius;
   const ConvexDistance nearest = distance(solid(side_[0].points), solid(side_[1].points), most);
-  if (!(nearest.distance <= most)) return part(nearest.distance - side_[0].core->radius - side_[1].core->radius);
+  if (!(nearest.distance <= most))
+    return void(apart_ = nearest.distance - side_[0].core->radius - side_[1].core->radius);
   // Cores that are apart by little more than round-off may have any normal by their nearest points.
   if (nearest.cores_intersect || !(depth_along(nearest.normal) < 0.0)) {
     touch(least_penetration(across_faces()), nullptr, margin);

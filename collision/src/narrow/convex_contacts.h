@@ -109,7 +109,6 @@ class ConvexContacts {
   double least_gap() const;
   double round_off() const;
 
-  void part(double gap) { apart_ = gap; }
   void let_pass(const Passing& passing, double margin);
   Direction keeping_apart(const Passing& passing);
   bool faces_tell(double margin);
