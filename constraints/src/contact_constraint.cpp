@@ -81,12 +81,14 @@ void ContactOptions::validate() const {
 
 struct ContactSet::Impl {
   ContactOptions options;
-  std::vector<const ContactPoint*> points;  // of those that act
-  std::vector<const ContactMemory*> known;  // by point
-  std::vector<std::size_t> first_of_pair;   // by pair, and where the last one ends
-  std::vector<std::size_t> bending;         // those with a side that may bend
-  std::vector<StartOfBody> starts;          // of bodies that points name, the world first
-  std::vector<std::uint64_t> started;       // in which update
+  struct {
+    std::vector<const ContactPoint*> points;  // of those that act
+    std::vector<const ContactMemory*> known;  // by point
+    std::vector<std::size_t> first_of_pair;   // by pair, and where the last one ends
+    std::vector<std::size_t> bending;         // those with a side that may bend
+  } listed;                                   // what acts in the step
+  std::vector<StartOfBody> starts;            // of bodies that points name, the world first
+  std::vector<std::uint64_t> started;         // in which update
   std::uint64_t updates = 0;
   std::vector<PreparedContact> contacts;
   std::vector<VertexShare> corners;  // of their sides, as what follows
@@ -111,6 +113,7 @@ struct ContactSet::Impl {
 /// What acts, pair by pair, and the bodies that it is between.
 void ContactSet::Impl::list(const BodyStates& states, std::span<const ContactPoint> found,
                             const ContactSurroundings& around) {
+  auto& [points, known, first_of_pair, bending] = listed;
   points.clear(), first_of_pair.clear(), bending.clear();
   ++updates;
   std::size_t bodies = 0;
@@ -139,7 +142,7 @@ void ContactSet::Impl::list(const BodyStates& states, std::span<const ContactPoi
 
 /// But for what a skin's memory is asked for, which one thread may do at a time.
 void ContactSet::Impl::prepare(const BodyStates& states, std::size_t number, const Vec3& origin) {
-  const ContactPoint& point = *points[number];
+  const ContactPoint& point = *listed.points[number];
   const StartOfBody &a = start(point.a.body), &b = start(point.b.body);
   PreparedContact& contact = contacts[number];
   contact = {};
@@ -170,7 +173,7 @@ void ContactSet::Impl::measure(const BodyStates& states, std::size_t number) {
     at[s] = arms[s] + pose.p + side.rim;
   }
   contact.offset = at[0] - at[1];
-  if (const ContactMemory* last = known[number])
+  if (const ContactMemory* last = listed.known[number])
     contact.last_force = last->force, contact.compliance = last->compliance, contact.slip = last->slip;
   else
     contact.approach = approach(states, contact, arms);
@@ -220,17 +223,17 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
                         const ContactSurroundings& surroundings, Jobs& jobs) {
   Impl& s = *impl_;
   s.list(states, points, surroundings);
-  s.history.find(s.points, s.known);
-  s.contacts.resize(s.points.size());
+  s.history.find(s.listed.points, s.listed.known);
+  s.contacts.resize(s.listed.points.size());
   const auto part = [&](std::size_t first, std::size_t end) {
     for (std::size_t i = first; i < end; ++i) s.prepare(states, i, surroundings.origin);
   };
   constexpr std::size_t kAtOnce = 64;
   jobs.parallel_for(s.contacts.size(), kAtOnce, std::ref(part));
   s.corners.clear(), s.turns.clear();
-  s.corners.reserve(6 * s.bending.size());  // three of each side
-  s.turns.reserve(2 * s.bending.size());
-  for (const std::size_t i : s.bending) {
+  s.corners.reserve(6 * s.listed.bending.size());  // three of each side
+  s.turns.reserve(2 * s.listed.bending.size());
+  for (const std::size_t i : s.listed.bending) {
     PreparedContact& contact = s.contacts[i];
     s.add_corners(states, contact.a);
     s.add_corners(states, contact.b);
@@ -238,10 +241,11 @@ void ContactSet::update(const BodyStates& states, std::span<const ContactPoint> 
   }
   s.constraints.clear();
   s.pairs.reuse(), s.rolling.reuse();
-  for (std::size_t p = 0; p + 1 < s.first_of_pair.size(); ++p) {
-    const std::size_t begin = s.first_of_pair[p];
+  for (std::size_t p = 0; p + 1 < s.listed.first_of_pair.size(); ++p) {
+    const std::size_t begin = s.listed.first_of_pair[p];
     PairContacts& pair = s.pairs.next();
-    const std::span<PreparedContact> of_pair = std::span(s.contacts).subspan(begin, s.first_of_pair[p + 1] - begin);
+    const std::span<PreparedContact> of_pair =
+        std::span(s.contacts).subspan(begin, s.listed.first_of_pair[p + 1] - begin);
     pair.set(of_pair, s.options, s.indentations);
     s.constraints.push_back(&pair);
     s.resist_rolling(states, of_pair);
@@ -268,10 +272,10 @@ std::span<PreparedContact> ContactSet::prepared() { return impl_->contacts; }
 
 void ContactSet::press_indentations(const BodyStates& states) {
   if (!impl_->options.residual_compliance) return;
-  for (const std::size_t i : impl_->bending)
+  for (const std::size_t i : impl_->listed.bending)
     for (std::size_t s = 0; s < 2; ++s)
       if (const PreparedSide& side = impl_->contacts[i].side(s); yields(side)) impl_->indentations.renew(side.body);
-  for (const std::size_t i : impl_->bending)
+  for (const std::size_t i : impl_->listed.bending)
     for (std::size_t s = 0; s < 2; ++s) {
       const PreparedContact& contact = impl_->contacts[i];
       const PreparedSide& side = contact.side(s);
@@ -287,7 +291,7 @@ std::span<Constraint* const> ContactSet::constraints() const { return impl_->con
 void ContactSet::finish(std::span<const char> asleep, bool some_woke) {
   Impl& s = *impl_;
   s.touched.clear();
-  for (const std::size_t i : s.bending)
+  for (const std::size_t i : s.listed.bending)
     for (const PreparedSide* side : {&s.contacts[i].a, &s.contacts[i].b})
       if (yields(*side)) s.touched.push_back(side->body);
   s.history.finish(s.contacts, asleep, some_woke);
@@ -307,7 +311,7 @@ std::span<const ContactMemory> ContactSet::resting() const { return impl_->histo
 std::span<const RollingMemory> ContactSet::rolling() const { return impl_->rolling_memory; }
 
 void ContactSet::clear() {
-  impl_->contacts.clear(), impl_->bending.clear();
+  impl_->contacts.clear(), impl_->listed.bending.clear();
   impl_->constraints.clear();
   impl_->history.clear();
   impl_->rolling_memory.clear();
@@ -321,7 +325,7 @@ void ContactSet::save_state(StateWriter& state) const {
 
 void ContactSet::restore_state(StateReader& state) {
   Impl& s = *impl_;
-  s.contacts.clear(), s.bending.clear();
+  s.contacts.clear(), s.listed.bending.clear();
   s.constraints.clear();
   state(s.options, s.history, s.rolling_memory, s.indentations);
   s.indentations.list_loaded();
