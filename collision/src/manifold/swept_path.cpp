@@ -37,11 +37,16 @@ void SweptPath::Side::go(double share) {
   for (std::size_t i = 0; i < rates.size(); ++i) amplitudes[i] += share * rates[i];
 }
 
+RigidTransform SweptPath::Side::after(double share) const {
+  return {quaternion_from_rotation_vector(share * state.rotation) * state.pose.q,
+          state.pose.p + share * state.displacement};
+}
+
 std::span<const Vec3> SweptPath::Side::points_after(double share, const ConvexCore& core) {
-  const Mat3 R = to_matrix(quaternion_from_rotation_vector(share * state.rotation) * state.pose.q);
-  const Vec3 p = state.pose.p + share * state.displacement;
+  const RigidTransform X_WB = after(share);
+  const Mat3 R = to_matrix(X_WB.q);
   points.clear();
-  for (const Vec3& point : core.points) points.push_back(p + R * point);
+  for (const Vec3& point : core.points) points.push_back(X_WB.p + R * point);
   return points;
 }
 
@@ -95,8 +100,9 @@ bool SweptPath::advance() {
   return true;
 }
 
-/// Conservative advancement: the gap between the nearest points of two convex shapes closes along the line of these, no
-/// faster than the bodies come and their farthest points turn. The answer is as that of TimeOfImpact.
+/// Conservative advancement: the gap along the line of the nearest points of two convex shapes closes no faster than
+/// the bodies come and their farthest points turn. As long as this line tells, the nearest points are not searched
+/// anew. The answer is as that of TimeOfImpact.
 ImpactTime SweptPath::touch_of_cores(double left, double least) {
   using Status = ImpactTime::Status;
   const ConvexCore &a = *pair_->a.core(), &b = *pair_->b.core();
@@ -109,11 +115,21 @@ ImpactTime SweptPath::touch_of_cores(double left, double least) {
     while (t == 0.0 && d.distance <= margin && 0.5 * margin >= least) margin *= 0.5;
     if (d.distance <= margin) return {t == 0.0 ? Status::kTouching : Status::kImpact, t, n};
     const double closing = turning_towards(d.normal) - d.normal.dot(way());
-    const double open = d.distance - collision_tuning().impact.kept_gap * margin;
-    if (!(closing * (left - t) > open)) return {Status::kNone, left, n};
-    t += open / closing;
+    double gap = d.distance;
+    for (int step = 0; step < most && gap > margin; ++step) {
+      const double open = gap - collision_tuning().impact.kept_gap * margin;
+      if (!(closing * (left - t) > open)) return {Status::kNone, left, n};
+      t += open / closing;
+      gap = gap_along(d.normal, sides_[0].after(t), sides_[1].after(t));
+    }
   }
   return {Status::kResting, t, most};
+}
+
+/// How far two convex shapes are apart along a direction. @param normal unit, from b to a
+double SweptPath::gap_along(const Vec3& normal, const RigidTransform& X_WA, const RigidTransform& X_WB) const {
+  return normal.dot(X_WA.p - X_WB.p) - pair_->a.core()->reach(X_WA.q.conjugate() * -normal) -
+         pair_->b.core()->reach(X_WB.q.conjugate() * normal);
 }
 
 /// How far points come along a direction, at most, as the bodies turn through what is left.
@@ -138,10 +154,9 @@ bool SweptPath::pass_beside(double left) const {
 /// Whether a plane does, all along what is left of the way. @param normal unit, from b to a
 bool SweptPath::keeps_apart(const Vec3& normal, double left) const {
   const RigidTransform &X_WA = sides_[0].state.pose, &X_WB = sides_[1].state.pose;
-  const double least = normal.dot(X_WA.p - X_WB.p) + std::min(0.0, left * normal.dot(way()));
-  if (!(least > 0.0)) return false;
-  const double gap = least - pair_->a.core()->reach(X_WA.q.conjugate() * -normal) -
-                     pair_->b.core()->reach(X_WB.q.conjugate() * normal);
+  const double closing = std::max(0.0, -left * normal.dot(way()));
+  if (!(normal.dot(X_WA.p - X_WB.p) > closing)) return false;
+  const double gap = gap_along(normal, X_WA, X_WB) - closing;
   return turning_towards(normal) * left <= gap - collision_tuning().impact.kept_gap * margin_;
 }
 

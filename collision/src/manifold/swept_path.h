@@ -43,12 +43,14 @@ class SweptPath {
 
     void begin(const BodyState& from);
     void go(double share);
+    RigidTransform after(double share) const;
     std::span<const Vec3> points_after(double share, const ConvexCore& core);
     MovingBody moving(const ManifoldBody& body) const;
   };
 
   ImpactTime touch_of_cores(double left, double least);
   double turning_towards(const Vec3& normal) const;
+  double gap_along(const Vec3& normal, const RigidTransform& X_WA, const RigidTransform& X_WB) const;
   bool pass_beside(double left) const;
   bool keeps_apart(const Vec3& normal, double left) const;
   Vec3 way() const;
