@@ -19,20 +19,23 @@ using namespace limber;
 
 constexpr int kStepsOfSecond = 60;
 constexpr const char* kUsage =
-    "contact_pile [--solver game|exact] [--finder exact|manifolds] [--substeps n] [--slop share] [--falls n] [bodies] "
-    "[seconds] "
-    "[modes, -1: all rigid] [boxes | rolling friction]\n";
+    "contact_pile [--solver game|exact] [--finder exact|manifolds] [--substeps n] [--slop share] [--falls n] "
+    "[--rehearse] [bodies] [seconds] [modes, -1: all rigid] [boxes | rolling friction]\n";
 
 struct Arguments {
   ContactOptions options;
   int count = 100, seconds = 8, modes = 6, falls = 1;
-  bool rolls = true, manifolds = false;
+  bool rolls = true, manifolds = false, rehearse = false;
 };
 
 bool read_arguments(int argc, char** argv, Arguments& arguments) {
   int place = 0;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
+    if (word == "--rehearse") {
+      arguments.rehearse = true;
+      continue;
+    }
     if (word.starts_with("--")) {
       if (++i == argc) return false;
       const std::string_view value = argv[i];
@@ -119,6 +122,14 @@ Second run_second(testing::Pile& pile) {
   return out;
 }
 
+/// Takes the steps of a fall and goes back to its start: the lists that grow on the way keep their memory.
+void rehearse(testing::Pile& pile, int seconds) {
+  std::vector<std::byte> state;
+  pile.world.save_state(state);
+  for (int i = 0; i < kStepsOfSecond * seconds; ++i) pile.step_once();
+  pile.world.restore_state(state);
+}
+
 /// @param number of the fall: each body starts up to a millimetre from where it does in the first
 std::vector<Second> fall(const Arguments& arguments, int number) {
   testing::Pile pile(arguments.count, arguments.modes, arguments.rolls, arguments.options);
@@ -130,6 +141,7 @@ std::vector<Second> fall(const Arguments& arguments, int number) {
     pose.p += 1e-3 * Vec3(std::sin(phase), std::cos(1.3 * phase), std::sin(0.7 * phase));
     pile.world.set_pose(pile.bodies[i], pose);
   }
+  if (arguments.rehearse) rehearse(pile, arguments.seconds);
   std::vector<Second> seconds;
   for (int second = 0; second < arguments.seconds; ++second) seconds.push_back(run_second(pile));
   return seconds;

@@ -74,6 +74,7 @@ class Measurement {
     for (auto* seconds : {&cost_.step_seconds, &cost_.position_seconds, &cost_.draw_seconds})
       seconds->reserve(static_cast<std::size_t>(cost_.size.steps));
     for (int n = 0; n < timed_.settling; ++n) player_.step();
+    if (options_.rehearse) rehearse();
     long before = 0;
     for (int n = 0; n < cost_.size.steps; ++n) {
       if (n == cost_.size.steps / 2) before = testing::allocations();
@@ -99,6 +100,13 @@ class Measurement {
     const double began = now();
     work();
     seconds.push_back(now() - began);
+  }
+
+  void rehearse() {
+    std::vector<std::byte> state;
+    player_.save_state(state);
+    for (int n = 0; n < cost_.size.steps; ++n) player_.step();
+    player_.restore_state(state);
   }
 
   void take_step() {

@@ -37,9 +37,10 @@ struct ContactChoice {
 };
 
 struct CostOptions {
-  int steps = 0;         ///< timed at most; 0: all of the scene
-  Jobs* jobs = nullptr;  ///< null: serial
-  bool draw = true;      ///< all bodies after every step: positions, then positions and normals
+  int steps = 0;          ///< timed at most; 0: all of the scene
+  Jobs* jobs = nullptr;   ///< null: serial
+  bool draw = true;       ///< all bodies after every step: positions, then positions and normals
+  bool rehearse = false;  ///< takes the timed steps once before, from the same state
   ContactChoice contact{};
 };
 

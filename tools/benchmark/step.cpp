@@ -28,7 +28,7 @@ struct StepArguments {
   SceneScale scale;
   ContactChoice contact;
   int steps = 0, threads = 1;
-  bool sweep = false;
+  bool sweep = false, rehearse = false;
   std::string csv, plot, limits, time_limits;
 };
 
@@ -198,7 +198,8 @@ void measure_scenes(Program& program, const StepArguments& a) {
   for (const std::string& name : a.scenes.empty() ? usual_scenes() : a.scenes) {
     if (name.ends_with(".json")) program.add_input(name);
     program.progress().stage(name);
-    costs.push_back(measure(source.scene(name, a.scale), {.steps = a.steps, .jobs = jobs.get(), .contact = a.contact}));
+    costs.push_back(measure(source.scene(name, a.scale),
+                            {.steps = a.steps, .jobs = jobs.get(), .rehearse = a.rehearse, .contact = a.contact}));
     program.print(text_of(costs.back()));
     report["scenes"].push_back(counts_of(costs.back()));
     times.push_back(times_of(costs.back()));
@@ -300,6 +301,8 @@ void declare_step(CLI::App& app, StepArguments& a) {
   app.add_option("--substeps", a.contact.substeps, "of the game solver; default: the scene's")
       ->type_name("N")
       ->check(CLI::Range(1, 1000));
+  app.add_flag("--rehearse", a.rehearse,
+               "take the steps once before, from the same state: the memory that they need is there");
   app.add_flag("--sweep", a.sweep, "how the cost grows with bodies, modes, vertices and contacts");
   app.add_option("--check", a.limits,
                  "measure small scenes alone and fail where counts are beyond these limits "
