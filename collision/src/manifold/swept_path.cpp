@@ -32,8 +32,8 @@ void SweptPath::Side::begin(const BodyState& from) {
 
 void SweptPath::Side::go(double share) {
   if (!moves) return;
-  state.pose.p += share * state.displacement;
-  state.pose.q = normalized(quaternion_from_rotation_vector(share * state.rotation) * state.pose.q);
+  state.pose = after(share);
+  state.pose.q = normalized(state.pose.q);
   for (std::size_t i = 0; i < rates.size(); ++i) amplitudes[i] += share * rates[i];
 }
 
