@@ -99,8 +99,9 @@ struct ImpactTuning {
   /// meets nothing.
   double touch = 1e-3;
   int touches_on_the_way = 4;  ///< of a pair that comes far, at most [1 to 16]. [path] Bounds its time
-  /// How many times a pair of convex shapes is looked at to follow it to its next touch [16 to 256]; one that is not
-  /// followed to its end counts as touching there. Steady. [path]
+  /// How many times the nearest points of a pair of convex shapes are searched to follow it to its next touch, and how
+  /// many steps it goes along the line of these before the next search [16 to 256]; one that is not followed to its end
+  /// counts as touching there. Steady. [path]
   int looks_on_the_way = 64;
   double kept_gap = 0.5;  ///< part of the margin that an advancement leaves [0.25 to 0.75]: a promise of the header
   /// An advancement below `good_advancement` [0.1 to 0.5] of the time looked ahead asks for a nearer look: at
