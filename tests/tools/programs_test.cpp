@@ -288,6 +288,25 @@ TEST_F(Programs, BenchmarkStepTellsWhatEachStageOfASceneCosts) {
   EXPECT_NEAR(shares, 1.0, 1e-9);
 }
 
+// In half of the steps the block lies on the ground.
+TEST_F(Programs, BenchmarkStepRehearsedTakesTheSameSteps) {
+  write_file(folder_ / "scene.json", R"({
+    "step": 0.01, "duration": 0.4, "assets": {"block": "block.glb"},
+    "statics": [{"name": "ground", "shape": {"half_space": {}}}],
+    "bodies": [{"name": "falls", "asset": "block", "position": [0, 0, 0.7]}]})");
+  const auto report_of = [this](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--report", "r.json"});
+    EXPECT_EQ(run("limber-benchmark", arguments).exit_code, 0);
+    return json("r.json");
+  };
+  const auto plain = report_of({"step", "--scene", "scene.json"});
+  const auto rehearsed = report_of({"step", "--scene", "scene.json", "--rehearse"});
+  EXPECT_GT(plain.at("scenes")[0].at("contacts_per_step"), 0.0);
+  EXPECT_EQ(plain.at("rehearsed"), false);
+  EXPECT_EQ(rehearsed.at("rehearsed"), true);
+  EXPECT_EQ(plain.at("scenes"), rehearsed.at("scenes"));
+}
+
 TEST_F(Programs, BenchmarkRefusesWhatItCannotMeasure) {
   expect_one_line(run("limber-benchmark", {}), 2, "subcommand");
   expect_one_line(run("limber-benchmark", {"step", "--bodies", "0"}), 2, "--bodies");

@@ -193,6 +193,7 @@ void measure_scenes(Program& program, const StepArguments& a) {
   Json& report = program.report();
   report["benchmark"] = "step";
   report["threads"] = a.threads;
+  report["rehearsed"] = a.rehearse;
   report["scenes"] = Json::array();
   Json times = Json::array();
   for (const std::string& name : a.scenes.empty() ? usual_scenes() : a.scenes) {
